@@ -85,7 +85,7 @@ from armlock.stability.semidiscretization import (
     spectral_radius,
     transition_matrix,
 )
-from armlock.systems import System, delay, distributed_delay, equation, parameter, s
+from armlock.systems import System, delay, equation, parameter, s
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
 from armlock.timedomain.responses import impulse_response, step_response
 from armlock.timedomain.simulation import (
@@ -148,7 +148,6 @@ __all__ = [
     "d_curve_line",
     "delay",
     "determinant",
-    "distributed_delay",
     "equation",
     "first_crossing",
     "flight_loop",

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from flint import fmpq, fmpq_poly
 
 from armlock.checks import FloatArray, real_number
 from armlock.engine.chain import Lag
-from armlock.engine.functions import Function, Space, common_zeros
+from armlock.engine.functions import Function, Space
 from armlock.engine.polynomials import Polynomial, collected, exact, order, polynomial
 from armlock.systems import Sum, System, exact_number
 
@@ -68,7 +67,7 @@ def _total(part: Mapping[Lag, fmpq_poly]) -> fmpq_poly:
 def functions(
     groups: Sequence[Sequence[Mapping[Lag, fmpq_poly]]],
     step: float = 0.0,
-    known: Mapping[fmpq, int] = MappingProxyType({}),
+    at_zero: int | None = None,
 ) -> Any:
     """Return sums of polynomials times delays as functions of one space, group by group.
 
@@ -83,7 +82,7 @@ def functions(
     union = list({str(p): p for some in bases for p in some}.values()) or [fmpq_poly([1])]
     names = {str(p): k for k, p in enumerate(union)}
     lags = {lag for group in groups for part in group for lag in part}
-    space = Space([Polynomial.of(p) for p in union], lags, step, known)
+    space = Space([Polynomial.of(p) for p in union], lags, step, at_zero)
     column = {lag: k for k, lag in enumerate(space.lags, 1)}
     found = []
     for group, chosen in zip(groups, bases, strict=True):
@@ -145,7 +144,7 @@ class Affine:
         self.origin = tuple(system.nominal.get(name) or 0.0 for name in free)
         given = system.given((), {**dict.fromkeys(free, 0.0), **numbers})
         values = {k: Sum.of(polynomial([v])) for k, v in given.items() if k not in free}
-        sums = [part.put(values).rounded() for part in (system.numerator, system.denominator)]
+        sums = [part.put(values) for part in (system.numerator, system.denominator)]
         for _, names in (key for part in sums for key in part.terms):
             if len(names) > 1:
                 raise NotAffineError(
@@ -161,7 +160,7 @@ class Affine:
             shares = zip(parts, map(exact, (1, *self.origin)), strict=True)
             there = collected((lag, p * x) for some, x in shares for lag, p in some.items())
             groups.append([there, *parts])
-        made, size = functions(groups, system.step, system.known), 2 + len(free)
+        made, size = functions(groups, system.step, system.at_zero), 2 + len(free)
         self.n: list[Function] = made[1:size]
         self.m: list[Function] = made[size + 1 :]
 
@@ -221,15 +220,10 @@ def present(n: Function, m: Function) -> tuple[Function, Function]:
     if not kept.size or max(space.polynomials[j].degree for j in kept) == space.degree:
         return n, m
     left = [space.polynomials[j] for j in kept]
-    own = Space(left, space.lags, space.step, space.known)
+    own = Space(left, space.lags, space.step, space.at_zero)
     return Function(own, n.steady[kept], n.delayed[kept]), Function(
         own, m.steady[kept], m.delayed[kept]
     )
-
-
-def common(n: Function, m: Function) -> int:
-    """Order of the root at s = 0 that N and M have in common; of an equation a known one."""
-    return n.space.known.get(fmpq(0), 0) if m.is_zero else common_zeros(n, m)
 
 
 def quotient_at(

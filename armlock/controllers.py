@@ -6,9 +6,8 @@ rad/s, the factors stay exact where expanded coefficients do not.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -27,7 +26,6 @@ from armlock.checks import (
 )
 from armlock.engine import statespace
 from armlock.engine.polynomials import Polynomial
-from armlock.engine.statespace import with_others
 
 
 def _of_systems(name: str) -> Callable[..., Any]:
@@ -86,8 +84,6 @@ class Controller:
 
     numerator: Polynomial
     denominator: Polynomial
-    #: The same controller for other values of poles and zeros that may be meant to be at s = 0.
-    others: tuple[Controller, ...] = field(default=(), compare=False)
 
     def __init__(self, zeros: Sequence[complex], poles: Sequence[complex], gain: float) -> None:
         above, below = _factors("zeros", zeros), _factors("poles", poles)
@@ -137,28 +133,28 @@ class Controller:
             with one input and output. A `System` must hold no delay and no parameter.
         integrators : int, optional
             How many poles of a python-control system are zero: 0, 1 or 2. It is needed where
-            rounding moved such poles, and a count depends on it.
+            rounding may have moved such poles.
         zeros : int, optional
-            The same for the zeros of a state space, for instance 1 for a high-pass filter, or
-            for an integrator that the input does not reach.
+            The same for its zeros, for instance 1 for a high-pass filter, or for an integrator
+            that the input does not reach.
 
         Raises
         ------
         TypeError, ValueError
             If it is none of these, is zero, is in discrete time, has several inputs or outputs,
-            or if the coefficients contradict `integrators` or `zeros` by more than
-            rounding.
+            if rounding hides whether a pole or zero is at s = 0, or if the coefficients
+            contradict `integrators` or `zeros` by more than rounding.
 
         Notes
         -----
         Coefficients and matrices are taken as the binary numbers that they are, exactly.
 
-        Rounding leaves some 1e-17 in place of a determinant that is meant to be zero, for
-        instance in other coordinates. A count that is not the same for all values that
-        rounding may leave raises `CountError`, unless `integrators` or `zeros` says what is
-        meant. A transfer function with such a lowest coefficient warns:
-        ``control.tf(state_space)`` has rounded it, so that the state space is the better
-        argument.
+        Rounding leaves some 1e-17 in place of a coefficient that is meant to be zero, for
+        instance of a state space in other coordinates, or of polynomials that were multiplied
+        out. A system whose lowest coefficient is as small is refused until `integrators` and
+        `zeros` say what is meant. What is stated is set to zero: a true pole at 1e-9 rad/s is
+        then lost. The next coefficient is asked in the same way. With ``integrators=0`` the
+        coefficients are taken as they are.
 
         A `Controller` or a triple keeps repeated zeros and poles. python-control does not: it
         multiplies all factors out, those of `control.zpk` too. It turns
@@ -185,12 +181,8 @@ class Controller:
         """Do what `System.__mul__` does; factors of controllers stay as they are given."""
         if not isinstance(other, Controller):
             return self.__rmul__(other)
-        return with_others(
-            lambda a, b: Controller.of_polynomials(
-                a.numerator * b.numerator, a.denominator * b.denominator
-            ),
-            self,
-            other,
+        return Controller.of_polynomials(
+            self.numerator * other.numerator, self.denominator * other.denominator
         )
 
     __add__ = __radd__ = _of_systems("__add__")
@@ -227,42 +219,23 @@ def rational(
 
     check_system("controller", system, "a Controller, a triple (zeros, poles, gain)")
     if isinstance(system, control.StateSpace):
-        found = statespace.of_matrices(
-            *(real_array("controller", getattr(system, name)).tolist() for name in "ABCD")
-        )
+        matrices = (real_array("controller", getattr(system, name)).tolist() for name in "ABCD")
+        parts = statespace.of_matrices([*matrices], integrators, zeros)
     else:
-        found = statespace.of_coefficients(
-            *(
-                real_array("controller", p[0][0])[::-1].tolist()
-                for p in (system.num, system.den)
-            )
+        powers = (
+            real_array("controller", p[0][0])[::-1].tolist() for p in (system.num, system.den)
         )
-        if found.below_bounds and integrators is None:
-            warnings.warn(
-                f"the lowest coefficient {float(found.below.exact[0]):.3g} of the denominator "
-                "is no larger than what rounding leaves of zero, and counts may rest on its "
-                "sign: give the state space that it was made of, or say how many poles are "
-                "zero, Controller.of(system, integrators=1)",
-                stacklevel=3,
-            )
-            found = found._replace(below_bounds=())
-    found = found.stated(integrators, zeros)
-    k = Controller.of_polynomials(found.above, found.below)
-    others = tuple(Controller.of_polynomials(*pair) for pair in found.others())
-    object.__setattr__(k, "others", others)
-    return k
+        above, below = powers
+        parts = statespace.of_coefficients(above, below, integrators, zeros)
+    return Controller.of_polynomials(*map(Polynomial.of, parts))
 
 
 def _of_system(system: Any) -> Controller:
     """Return a system without delays and parameters as a controller."""
     if system.parameters or system.longest_delay or system.is_equation:
         raise ValueError(f"controller must hold no delay and no parameter, got {system!r:.200}")
-    return with_others(
-        lambda one: Controller.of_polynomials(
-            *(Polynomial.of(p.whole()) for p in (one.numerator, one.denominator))
-        ),
-        system,
-    )
+    parts = (p.whole() for p in (system.numerator, system.denominator))
+    return Controller.of_polynomials(*map(Polynomial.of, parts))
 
 
 def check_system(name: str, system: Any, others: str) -> None:

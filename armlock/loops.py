@@ -165,7 +165,7 @@ class Loop(System):
             "controller": k, "mapping": m, "tau1": tau1, "tau2": tau2,
             "delay": not_negative("delay", self.delay),
             "arms": (pure_delay(tau1), pure_delay(tau2)),
-            "nominal": {"c1": 1.0, "c2": 1.0}, "step": 0.0,
+            "nominal": {"c1": 1.0, "c2": 1.0}, "step": 0.0, "at_zero": None,
         }  # fmt: skip
         for name, value in kept.items():
             object.__setattr__(self, name, value)
@@ -183,13 +183,11 @@ class Loop(System):
                 f"the loop is not well posed: 1 + K (m1 + m2) must not vanish at high "
                 f"frequency, got {highest}"
             )
-        others = tuple(self.replace(controller=other) for other in k.others)
-        object.__setattr__(self, "others", others)
 
     def __getstate__(self) -> dict[str, Any]:  # type: ignore[override]
         """Return the arguments and the delay objects."""
         names = [one.name for one in fields(self)]
-        return {name: getattr(self, name) for name in (*names, "nominal", "step", "others")}
+        return {name: getattr(self, name) for name in (*names, "nominal", "step", "at_zero")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:  # type: ignore[override]
         """Take them back."""

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import prod
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from flint import fmpq
 
 from armlock.checks import FloatArray, real_array, whole_number
 from armlock.controllers import check_continuous
-from armlock.engine import statespace
-from armlock.engine.polynomials import exact, polynomial
-from armlock.engine.statespace import bordered, with_others
+from armlock.engine.polynomials import exact, order, polynomial
+from armlock.engine.statespace import bordered, settled
 from armlock.systems import (
     Sum,
     System,
     delay,
     delay_object,
-    equation,
+    equation_of,
     names_of,
     proportion,
-    together,
 )
 
 # Most terms that a determinant may multiply, about a minute.
@@ -30,13 +27,15 @@ _MOST_PRODUCTS = 4_000_000
 _ONE = Sum.of(polynomial([1]))
 
 
-def determinant(matrix: Any) -> System:
+def determinant(matrix: Any, *, at_zero: int | None = None) -> System:
     """Return the equation det = 0 of a square matrix of systems.
 
     Parameters
     ----------
     matrix : sequence of rows
         Of systems as `System.of` takes them, numbers included.
+    at_zero : int, optional
+        How many roots at s = 0 are left out, as of `equation`.
 
     Returns
     -------
@@ -55,7 +54,8 @@ def determinant(matrix: Any) -> System:
     -----
     Each entry is a system of its own, and all of its modes count, hidden ones too: a row is
     multiplied by its denominators. Entries of a row that are one transfer function, up to a
-    number, are one system. No common divisor is taken out but powers of s.
+    number, are one system. A root at s = 0 of a row counts too. Only where an entry has a zero
+    there in both its numerator and denominator, a power of s that the row has is divided out.
 
     Examples
     --------
@@ -66,10 +66,10 @@ def determinant(matrix: Any) -> System:
     >>> print(f"{rightmost_root(tanks):.4f}")
     0.1357+0.0000j
     """
-    return equation(_whole(matrix))
+    return _whole(matrix).equation(at_zero)
 
 
-def return_difference(plant: Any, controllers: Any) -> System:
+def return_difference(plant: Any, controllers: Any, *, at_zero: int | None = None) -> System:
     """Return the equation det(1 + P C) = 0 of several loops, with negative feedback.
 
     Parameters
@@ -78,6 +78,8 @@ def return_difference(plant: Any, controllers: Any) -> System:
         P, with a row for each output; or (A, B, C) or (A, B, C, D) as `state_space` takes them.
     controllers : sequence
         The controller of each loop, or the matrix C with a row for each input of the plant.
+    at_zero : int, optional
+        How many roots at s = 0 are left out, as of `equation`.
 
     Returns
     -------
@@ -122,18 +124,18 @@ def return_difference(plant: Any, controllers: Any) -> System:
             ]
         )
     )
-    states = n + whole.denominator.degree
-    if whole.numerator.degree > states:
+    states = n + whole.poles
+    if whole.d.degree > states:
         raise ValueError(
             "plant and controllers must not have more zeros than poles: the determinant has "
-            f"s^{whole.numerator.degree} with {states} states; give the controllers a filter"
+            f"s^{whole.d.degree} with {states} states; give the controllers a filter"
         )
-    if all(lag or p.degree() < states for (lag, _), p in whole.numerator.terms.items()):
+    if all(lag or p.degree() < states for (lag, _), p in whole.d.terms.items()):
         raise ValueError(
             "the loops must be well posed: at high frequency what nothing delays has a "
             "determinant of zero"
         )
-    return equation(whole)
+    return whole.equation(at_zero)
 
 
 def state_space(
@@ -144,6 +146,7 @@ def state_space(
     *,
     integrators: int | None = None,
     zeros: int | None = None,
+    at_zero: int | None = None,
 ) -> System:
     """Return a state space with delays, x' = sum of A_k x(t - h_k) + b u, y = c x + d u.
 
@@ -159,6 +162,8 @@ def state_space(
         How many poles are meant to be zero, 0 or 1, where rounding of the matrices hides it.
     zeros : int, optional
         The same for the zeros, of which a pole that `b` does not reach is one.
+    at_zero : int, optional
+        How many poles at s = 0 the equation leaves out, as of `equation`.
 
     Returns
     -------
@@ -181,54 +186,39 @@ def state_space(
     """
     if (b is None) != (c is None):
         raise TypeError("b and c must be given both, or none of them")
-    rows, total, sizes = _states(a)
+    rows = _states(a)
     below = _determinant(rows)
-    # Rounding of the matrices may hide that a pole is meant to be zero.
-    bound, lowest = statespace.doubt(-total, sizes), below.whole()[0]
-    changes = [v - lowest for v in _meant("integrators", integrators, lowest, bound)]
     if b is None:
         if zeros is not None:
             raise TypeError(f"zeros must not be given without b and c, got {zeros}")
-        made = [System(below + _number(v), Sum({})) for v in changes]
-    else:
-        column, row, direct = (
-            _matrix(*pair).ravel() for pair in (("b", b), ("c", c), ("d", d))
-        )
-        if (len(column), len(row), len(direct)) != (len(rows), len(rows), 1):
-            raise ValueError(
-                f"b and c must have {len(rows)} numbers, and d one, got {len(column)}, "
-                f"{len(row)} and {len(direct)}: several inputs or outputs are for "
-                "return_difference"
-            )
-        through = exact(direct[0])
-        above = _determinant(
-            bordered(rows, map(_number, -column), map(_number, row), _number(through))
-        )
-        bound = statespace.doubt(
-            bordered(-total, -column, row, through),
-            bordered(sizes, abs(column), abs(row), abs(through)),
-        )
-        made = []
-        for v in changes:
-            lowest = above.whole()[0] + v * through
-            for w in _meant("zeros", zeros, lowest, bound):
-                moved = _number(v * through + w - lowest)
-                made.append(System(above + moved, below + _number(v)))
-    found, *others = made
-    found.others = tuple(others)
-    return found
-
-
-def _meant(name: str, given: int | None, value: fmpq, bound: fmpq) -> list[fmpq]:
-    """Return what a lowest coefficient may be: as it is, and if in doubt around zero."""
-    if given is None:
-        return [value, *((-bound, fmpq(0), bound) if bound else ())]
-    if whole_number(name, given, 0) > bool(bound):
+        if integrators is not None:
+            below = below + -_rounding("integrators", integrators, below)
+        if integrators == 0 and at_zero is None:
+            at_zero = 0
+        return equation_of(below, {}, at_zero)
+    if at_zero is not None:
+        raise TypeError(f"at_zero must not be given with b and c, got {at_zero}")
+    column, row, direct = (_matrix(*pair).ravel() for pair in (("b", b), ("c", c), ("d", d)))
+    if (len(column), len(row), len(direct)) != (len(rows), len(rows), 1):
         raise ValueError(
-            f"{name} must be {'0 or 1' if bound else '0'}, got {given}: rounding of the "
-            "matrices hides no more"
+            f"b and c must have {len(rows)} numbers, and d one, got {len(column)}, "
+            f"{len(row)} and {len(direct)}: several inputs or outputs are for "
+            "return_difference"
         )
-    return [fmpq(0) if given else value]
+    moved, through = _rounding("integrators", integrators, below), _number(exact(direct[0]))
+    above = _determinant(bordered(rows, map(_number, -column), map(_number, row), through)) + -(
+        through * moved
+    )
+    return System(above + -_rounding("zeros", zeros, above), below + -moved)
+
+
+def _rounding(name: str, number: int | None, d: Sum) -> Sum:
+    """Return the lowest coefficients of a determinant that are meant to be zero."""
+    if not d:
+        return d
+    series = d.lowest(whole_number(name, number or 0, 0) + 2)
+    stated = settled(name, number, series)
+    return Sum.of(polynomial(series[0].coefficients[:stated]))
 
 
 def _number(value: Any) -> Sum:
@@ -260,7 +250,7 @@ def _parts(plant: Any) -> tuple[Any, ...]:
         none = [np.zeros(shape, object) for shape in ((0, 0), (0, d.shape[1]), (d.shape[0], 0))]
         return *none, d
     a, b, c, *d = plant
-    rows, _, _ = _states(a)
+    rows = _states(a)
     b, c = (np.atleast_2d(_matrix(*pair)) for pair in (("B", b), ("C", c)))
     b = b.reshape(len(rows), -1)
     d = _matrix("D", d[0]) if d else np.zeros((len(c), b.shape[1]))
@@ -285,8 +275,8 @@ def _array(name: str, matrix: Any) -> Any:
     return np.array([[System.of(entry, name) for entry in row] for row in listed], object)
 
 
-def _states(a: Any) -> tuple[list[list[Sum]], Any, Any]:
-    """Return s - A_0 - A_1 exp(-s h_1) - ..., and the exact sums of A_k and of sizes."""
+def _states(a: Any) -> list[list[Sum]]:
+    """Return s - A_0 - A_1 exp(-s h_1) - ..."""
     given = a if isinstance(a, Mapping) else {0.0: a}
     parts = {h: _matrix("a", part) for h, part in given.items()}
     shapes = {part.shape for part in parts.values()}
@@ -295,39 +285,56 @@ def _states(a: Any) -> tuple[list[list[Sum]], Any, Any]:
         raise ValueError(f"a must hold square matrices of one size, got {[shape, *shapes]}")
     n = len(next(iter(parts.values())))
     found = [[Sum.of(polynomial([0, int(i == k)])) for k in range(n)] for i in range(n)]
-    total, sizes = (np.full(shape, fmpq(0), object) for _ in range(2))
     for h, part in parts.items():
         if isinstance(h, System):
             delay_object(h, "a key of a")
         late = (h if isinstance(h, System) else delay(h)).numerator
         for i, k in zip(*np.nonzero(part), strict=True):
-            value = exact(part[i, k])
-            found[i][k] = found[i][k] + late * _number(-value)
-            total[i, k] += value
-            sizes[i, k] += abs(value)
-    return found, total, sizes
+            found[i][k] = found[i][k] + late * _number(-exact(part[i, k]))
+    return found
 
 
-def _whole(matrix: Any) -> System:
-    """Return the determinant of a matrix, over all denominators."""
+class _Whole(NamedTuple):
+    """The determinant of a matrix whose rows are cleared of denominators.
+
+    Attributes
+    ----------
+    d : Sum
+        The determinant.
+    nominal : dict of str to float or None
+        The parameters.
+    poles : int
+        Degree of the denominators that are cleared.
+    cleared : int
+        How many of the roots at s = 0 come from clearing denominators.
+    """
+
+    d: Sum
+    nominal: dict[str, float | None]
+    poles: int
+    cleared: int
+
+    def equation(self, at_zero: int | None) -> System:
+        """Return the equation, without the roots at s = 0 that are stated."""
+        return equation_of(self.d, self.nominal, at_zero, self.cleared)
+
+
+def _whole(matrix: Any) -> _Whole:
+    """Return the determinant of a matrix."""
     rows = _array("matrix", matrix)
     size, columns = rows.shape
     if size != columns:
         raise ValueError(f"matrix must be square, got {size} x {columns}")
-
-    def made(*entries: System) -> System:
-        cleared, below, known = [], _ONE, list[Mapping[fmpq, int]]()
-        for k in range(0, size**2, size):
-            row, under, zeros = _cleared(entries[k : k + size])
-            cleared.append(row)
-            below, known = below * under, known + zeros
-        return System(_determinant(cleared), below, names_of(entries), known=together(known))
-
-    return with_others(made, *rows.ravel())
+    cleared, poles, zeros = zip(*map(_cleared, rows), strict=True)
+    return _Whole(_determinant(cleared), names_of(rows.ravel()), sum(poles), sum(zeros))
 
 
-def _cleared(row: Sequence[System]) -> tuple[list[Sum], Sum, list[Mapping[fmpq, int]]]:
-    """Return a row times the denominators of its systems, their product, and known zeros."""
+def _cleared(row: Sequence[System]) -> tuple[list[Sum], int, int]:
+    """Return a row times its denominators, their degree, and what zeros at s = 0 that makes.
+
+    Where numerator and denominator of an entry are both zero at s = 0, so is the row times the
+    denominator. A power of s that all terms of the row hold is divided out then.
+    """
     kinds: list[System] = []
     places = []
     for entry in row:
@@ -340,8 +347,13 @@ def _cleared(row: Sequence[System]) -> tuple[list[Sum], Sum, list[Mapping[fmpq, 
         factor = proportion(kinds[place].denominator, entry.denominator)
         others = (kind.denominator for k, kind in enumerate(kinds) if k != place)
         cleared.append(prod(others, start=entry.numerator * Sum.of(polynomial([factor]))))
-    whole = prod((kind.denominator for kind in kinds), start=_ONE)
-    return cleared, whole, [kind.known for kind in kinds]
+    poles = sum(kind.denominator.degree for kind in kinds)
+    zeros = sum(kind.cancelled() for kind in kinds)
+    powers = [order(p.coeffs()) for entry in cleared for p in entry.terms.values()]
+    power = min([zeros, *powers])
+    if power:
+        cleared = [entry.over(power) for entry in cleared]
+    return cleared, poles - power, zeros - power
 
 
 def _proportional(one: System, other: System) -> bool:

@@ -14,14 +14,11 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
-from functools import lru_cache
 from itertools import chain
 from math import factorial
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import flint
-import mpmath
 import numpy as np
 import numpy.typing as npt
 from flint import acb, acb_poly, arb, fmpq, fmpq_poly
@@ -34,24 +31,26 @@ from armlock.checks import (
     broadcast_shape,
     complex_array,
     not_negative,
-    positive_number,
     real_array,
     real_number,
+    whole_number,
     whole_steps,
 )
 from armlock.controllers import Controller, check_system, rational
 from armlock.engine.chain import NOW, Delay, Lag
-from armlock.engine.polynomials import collected, exact, in_mpmath, order, polynomial
-from armlock.engine.statespace import with_others
+from armlock.engine.polynomials import collected, exact, order, polynomial, rounded
+from armlock.engine.statespace import ROUNDED, Lowest, settled
 
 if TYPE_CHECKING:
     import control
 
 #: A product of delays, and the names of the parameters that are multiplied.
 Key = tuple[Lag, tuple[str, ...]]
+#: Sizes of coefficients, by the parameters that are multiplied.
+Sizes = dict[tuple[str, ...], fmpq_poly]
 
 _ONE, _S = fmpq_poly([1]), fmpq_poly([0, 1])
-_ZERO, _UNIT = fmpq(0), fmpq(1)
+_UNIT = fmpq(1)
 # Arguments of the functions that take parameters by name.
 _TAKEN = frozenset(
     [
@@ -83,11 +82,6 @@ _TAKEN = frozenset(
 )
 # Coefficients at s = 0 that are looked at for a limit there.
 _TERMS = 16
-# Bits of the fraction that stands for exp(x), and of those how many may cancel (Lemma 23).
-_BITS, _MAY_CANCEL = 512, 200
-# So near to a zero that N and M share, in units of one over the longest delay, their series is
-# used.
-_NEAR = 0.1
 # Where the terms of a sum are larger than the sum by this factor, it is computed with balls: of
 # so many bits at first, and at most, until so many of them are known.
 _MAY_LOSE, _FEWEST_BITS, _MOST_BITS, _ENOUGH_BITS = 2.0**11, 128, 1 << 14, 60
@@ -105,19 +99,17 @@ _LARGEST_POWER = 10**6
 _LONGEST_TEXT = 400
 
 
-@lru_cache
-def exponential(x: fmpq) -> fmpq:
-    """Return the fraction that stands for exp(x)."""
-    with mpmath.workprec(_BITS):
-        value = mpmath.exp(in_mpmath(x))
-    return fmpq(*mpmath.libmp.to_rational(value._mpf_))
-
-
 class Sum:
-    """A sum of polynomials of s times delays and parameters: {(lag, names): polynomial}."""
+    """A sum of polynomials of s times delays and parameters: {(lag, names): polynomial}.
 
-    def __init__(self, terms: Mapping[Key, fmpq_poly]) -> None:
+    Where terms were put together, it keeps the sizes that they had before: the magnitudes of
+    coefficients, by products of parameters. Of a coefficient that is much smaller rounding may
+    be all that is left.
+    """
+
+    def __init__(self, terms: Mapping[Key, fmpq_poly], sizes: Sizes | None = None) -> None:
         self.terms = {key: p for key, p in terms.items() if p}
+        self._sizes = sizes
 
     @classmethod
     def of(cls, p: fmpq_poly, lag: Lag = NOW, *names: str) -> Sum:
@@ -126,21 +118,39 @@ class Sum:
 
     def __add__(self, other: Sum) -> Sum:
         """Return the sum."""
-        return Sum(collected((*self.terms.items(), *other.terms.items())))
+        found = collected((*self.terms.items(), *other.terms.items()))
+        if len(found) == len(self.terms) + len(other.terms) and self._plain(other):
+            return Sum(found)
+        return Sum(found, collected((*self.sizes.items(), *other.sizes.items())))
 
     def __mul__(self, other: Sum) -> Sum:
         """Return the product."""
-        return Sum(
-            collected(
-                ((t.times(u), tuple(sorted(a + b))), p * q)
-                for (t, a), p in self.terms.items()
-                for (u, b), q in other.terms.items()
-            )
+        found = collected(
+            ((t.times(u), tuple(sorted(a + b))), p * q)
+            for (t, a), p in self.terms.items()
+            for (u, b), q in other.terms.items()
         )
+        if len(found) == len(self.terms) * len(other.terms) and self._plain(other):
+            return Sum(found)
+        return Sum(found, _times(self.sizes, other.sizes))
+
+    def _plain(self, other: Sum) -> bool:
+        """Tell whether no terms of two sums were put together."""
+        return self._sizes is None and other._sizes is None
+
+    @property
+    def sizes(self) -> Sizes:
+        """The sizes that its terms had before they were put together."""
+        if self._sizes is None:
+            self._sizes = collected(
+                (names, fmpq_poly([abs(c) for c in p.coeffs()]))
+                for (_, names), p in self.terms.items()
+            )
+        return self._sizes
 
     def __neg__(self) -> Sum:
         """Return the negative."""
-        return Sum({key: -p for key, p in self.terms.items()})
+        return Sum({key: -p for key, p in self.terms.items()}, self._sizes)
 
     def __bool__(self) -> bool:
         """Whether it is not zero."""
@@ -162,26 +172,48 @@ class Sum:
             for name in names:
                 term = term * values[name] if name in values else term
             found = found + term
-        return found
+        if self._sizes is None:
+            return found
+        sizes: Sizes = {}
+        for names, p in self._sizes.items():
+            size = {tuple(a for a in names if a not in values): p}
+            for name in names:
+                size = _times(size, values[name].sizes) if name in values else size
+            sizes = collected((*sizes.items(), *size.items()))
+        return Sum(found.terms, sizes)
 
     def before(self, *names: str) -> dict[Lag, fmpq_poly]:
         """Return what stands before a product of parameters, by delays."""
         return {lag: p for (lag, given), p in self.terms.items() if given == names}
 
-    def rounded(self) -> Sum:
-        """Return the sum with fractions for the numbers exp(x) before delays (Lemma 23)."""
-        if not any(lag.growth for lag, _ in self.terms):
-            return self
-        grown = collected(
-            (((lag.plain, names), lag.growth), p) for (lag, names), p in self.terms.items()
+    def over(self, power: int, early: Lag = NOW) -> Sum:
+        """Return the sum over a power of s that all terms hold, and earlier by a delay."""
+        divisor = _S**power
+        sizes = self._sizes and {names: p // divisor for names, p in self._sizes.items()}
+        return Sum(
+            {(t.times(early), names): p // divisor for (t, names), p in self.terms.items()},
+            sizes,
         )
-        terms = [(key, p * exponential(x)) for (key, x), p in grown.items()]
-        found = collected(terms)
-        sizes = collected((key, fmpq_poly([abs(c) for c in p.coeffs()])) for key, p in terms)
-        for key, p in found.items():
-            if any(abs(p[k]) * 2**_MAY_CANCEL < b for k, b in enumerate(sizes[key].coeffs())):
-                raise ValueError("exponentials of the system cancel to more than 200 bits")
-        return Sum(found)
+
+    def lowest(self, number: int) -> list[Lowest]:
+        """Return the lowest coefficients at s = 0, and what rounding may make of them.
+
+        One for each product of parameters, beginning with what stands before none.
+        """
+        longest = max((lag.time for lag in self.lags), default=fmpq(0))
+        growth = fmpq_poly([longest**k / factorial(k) for k in range(number)])
+        found = []
+        for names, size in sorted(self.sizes.items()):
+            bounds = ROUNDED * size * growth
+            found.append(Lowest(self.series(number, names), [bounds[k] for k in range(number)]))
+        return found
+
+    def without(self, stated: int) -> Sum:
+        """Return the sum with zeros for the lowest coefficients at s = 0."""
+        if not stated:
+            return self
+        lowest = {(NOW, names): self.series(stated, names) for names in self.sizes}
+        return self + Sum({key: -fmpq_poly(c) for key, c in lowest.items()})
 
     def whole(self) -> fmpq_poly:
         """Return the sum of all polynomials: what is left at s = 0."""
@@ -195,26 +227,31 @@ class Sum:
     @property
     def lags(self) -> set[Lag]:
         """All products of delays."""
-        return {lag.plain if lag.growth else lag for lag, _ in self.terms}
+        return {lag for lag, _ in self.terms}
 
-    def series(self, number: int, at: fmpq = _ZERO) -> list[fmpq]:
-        """Return the first coefficients of the series at a point, without parameters.
-
-        They are exact, apart from the fractions that stand for exponentials.
-        """
+    def series(self, number: int, names: tuple[str, ...] = ()) -> list[fmpq]:
+        """Return the first coefficients at s = 0 of what stands before parameters, exactly."""
         found = [fmpq(0)] * number
-        for (lag, _), p in self.terms.items():
-            moved, theta = p(fmpq_poly([at, 1])), lag.time
-            factor = exponential(lag.growth - at * lag.time)
-            for i, c in enumerate(moved.coeffs()[:number]):
+        for lag, p in self.before(*names).items():
+            for i, c in enumerate(p.coeffs()[:number]):
                 for k in range(i, number):
-                    found[k] += factor * c * (-theta) ** (k - i) / factorial(k - i)
+                    found[k] += c * (-lag.time) ** (k - i) / factorial(k - i)
         return found
+
+    def order(self) -> int:
+        """Return the order of the zero at s = 0 that it has for all values of parameters."""
+        number = 1
+        while number <= _TERMS:
+            series = [self.series(number, names) for _, names in self.terms]
+            found = min(map(order, series), default=number)
+            if found < number:
+                return found
+            number *= 4
+        return _TERMS
 
     def by_length(self, *names: str) -> dict[fmpq, fmpq_poly]:
         """Return what stands before a product of parameters, by lengths in ascending order."""
-        parts = self.rounded().before(*names)
-        found = collected((lag.time, p) for lag, p in parts.items())
+        found = collected((lag.time, p) for lag, p in self.before(*names).items())
         return {time: p for time, p in sorted(found.items()) if p}
 
     @np.errstate(under="ignore")
@@ -247,9 +284,8 @@ class Sum:
         if not values:
             add(self.whole(), near)
         for (lag, names), p in self.terms.items():
-            start = float(lag.growth / lag.time) if lag.growth else 0.0
             gain = np.prod([values[name] for name in names], axis=0) + np.zeros(s.shape)
-            turn = -(s - start) * float(lag.time)
+            turn = -s * float(lag.time)
             if values:
                 add(p, near, gain[near])
             if lag.time:
@@ -265,16 +301,14 @@ class Sum:
         """Evaluate at one point, with as many bits as the terms cancel."""
         # Delays of one length are one here: no sum that is left is zero but at s = 0 and at
         # zeros of its polynomials, which are exact in balls.
-        terms = collected(
-            ((lag.time, lag.growth, names), p) for (lag, names), p in self.terms.items()
-        )
+        terms = collected(((lag.time, names), p) for (lag, names), p in self.terms.items())
         at, bits = acb(s.real, s.imag), _FEWEST_BITS
         while True:
             with flint.ctx.workprec(bits):
                 total = acb(0)
-                for (theta, growth, names), p in terms.items():
+                for (theta, names), p in terms.items():
                     if p:
-                        term = acb_poly(p)(at) * (arb(growth) - at * arb(theta)).exp()
+                        term = acb_poly(p)(at) * (-at * arb(theta)).exp()
                         total += math.prod((acb(values[name]) for name in names), start=term)
                 total /= arb(size)
             if total.rel_accuracy_bits() > _ENOUGH_BITS or total == 0 or bits > _MOST_BITS:
@@ -299,6 +333,11 @@ class Sum:
         return " + ".join(shown).replace("+ -", "- ") or "0"
 
 
+def _times(a: Sizes, b: Sizes) -> Sizes:
+    """Multiply sizes."""
+    return collected((tuple(sorted(m + n)), p * q) for m, p in a.items() for n, q in b.items())
+
+
 def _number(value: fmpq) -> str:
     """Return a fraction, which may be no float, with six digits."""
     try:
@@ -310,9 +349,8 @@ def _number(value: fmpq) -> str:
 
 
 def _exponential(lag: Lag, latex: bool) -> str:
-    """Return exp(x - s theta) as text."""
-    x = f"{_number(lag.growth)} - " if lag.growth else "-"
-    exponent = f"{x}{_number(lag.time)} s"
+    """Return exp(-s theta) as text."""
+    exponent = f"-{_number(lag.time)} s"
     return f"e^{{{exponent}}}" if latex else f"exp({exponent})"
 
 
@@ -358,9 +396,9 @@ class System:
         The parameters in the order of their first use, with their nominal values.
     step : float
         Zero, or the step in s of a map (`equation`).
-    known : mapping of fmpq to int
-        Real numbers in rad/s at which numerator and denominator are both zero, and the order:
-        these are no roots (`distributed_delay`).
+    at_zero : int or None
+        How many roots at s = 0 are stated and left out (`equation`). None for open loops, of
+        which the roots at s = 0 that N and M have in common are left out.
 
     Notes
     -----
@@ -389,9 +427,7 @@ class System:
     denominator: Sum
     nominal: dict[str, float | None]
     step: float
-    known: Mapping[fmpq, int] = MappingProxyType({})
-    #: The same for other values of poles that may be meant to be zero; usually none.
-    others: tuple[System, ...] = ()
+    at_zero: int | None
 
     def __init__(
         self,
@@ -399,12 +435,12 @@ class System:
         denominator: Sum,
         nominal: Mapping[str, float | None] | None = None,
         step: float = 0.0,
-        known: Mapping[fmpq, int] = MappingProxyType({}),
+        at_zero: int | None = None,
     ) -> None:
-        self.numerator, self.denominator = _reduced(numerator, denominator)
-        self.nominal, self.step = dict(nominal or {}), step
-        if known:
-            self.known = dict(known)
+        if at_zero is None and not denominator:
+            at_zero = 0
+        self.numerator, self.denominator = _reduced(numerator, denominator, at_zero is None)
+        self.nominal, self.step, self.at_zero = dict(nominal or {}), step, at_zero
 
     @classmethod
     def of(cls, system: Any, name: str = "system") -> System:
@@ -430,11 +466,8 @@ class System:
             return System(Sum.of(fmpq_poly([exact_number(name, system)])), _UNITY)
         if not isinstance(system, Controller):
             check_system(name, system, "a System, a number, a Controller")
-
-        def made(k: Controller) -> System:
-            return System(Sum.of(k.numerator.exact), Sum.of(k.denominator.exact))
-
-        return with_others(made, rational(system))
+        k = rational(system)
+        return System(Sum.of(k.numerator.exact), Sum.of(k.denominator.exact))
 
     @property
     def is_equation(self) -> bool:
@@ -445,6 +478,11 @@ class System:
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters, in the order of their first use."""
         return tuple(self.nominal)
+
+    def cancelled(self) -> int:
+        """Return the order of the zero at s = 0 of N and M, for all values of parameters."""
+        n, m = self.numerator, self.denominator
+        return min(n.order(), m.order()) if m and not m.whole()[0] else 0
 
     @property
     def longest_delay(self) -> float:
@@ -528,12 +566,8 @@ class System:
             if given.denominator.terms != _UNITY.terms:
                 raise ValueError(f"{name} must have no denominator, got {given!r}")
             put[name], names = given.numerator, names | given.nominal
-        return with_others(
-            lambda one: System(
-                one.numerator.put(put), one.denominator.put(put), names, one.step, one.known
-            ),
-            self,
-        )
+        above, below = (part.put(put) for part in (self.numerator, self.denominator))
+        return System(above, below, names, self.step, self.at_zero)
 
     def opened(self, name: str) -> System:
         """Return the open loop that a parameter closes, with all else as it is.
@@ -547,19 +581,21 @@ class System:
             Of the parameter.
         """
         self.check_names("name", [name])
-
-        def made(one: System) -> System:
-            parts = Sum({}), Sum({}), Sum({})
-            for (lag, names), p in (one.numerator + one.denominator).terms.items():
-                parts[min(names.count(name), 2)].terms[lag, names] = p
-            if parts[2] or not parts[0]:
-                raise ValueError(
-                    f"name must be a parameter in which D is affine, and not zero without it, "
-                    f"got {name!r}"
-                )
-            return System(parts[1], parts[0], one.nominal, known=one.known)
-
-        return with_others(made, self)
+        parts = Sum({}), Sum({}), Sum({})
+        for (lag, names), p in (self.numerator + self.denominator).terms.items():
+            parts[min(names.count(name), 2)].terms[lag, names] = p
+        if parts[2] or not parts[0]:
+            raise ValueError(
+                f"name must be a parameter in which D is affine, and not zero without it, "
+                f"got {name!r}"
+            )
+        found = System(parts[1], parts[0], self.nominal, at_zero=self.at_zero)
+        if self.at_zero is not None and found.cancelled() > self.at_zero:
+            raise ValueError(
+                f"at_zero must be stated for an equation that has {found.cancelled()} roots at "
+                f"s = 0 for all values of {name}, got at_zero={self.at_zero}"
+            )
+        return found
 
     def given(self, values: Iterable[Any], numbers: Mapping[str, Any]) -> dict[str, Any]:
         """Return a value of each parameter, by place, by name, or nominal; raise otherwise."""
@@ -621,12 +657,8 @@ class System:
         if self.is_equation:
             return self.numerator.at(s, arrays)[0]
         value, _ = self.quotient(s, arrays)
-        for point in {_ZERO, *self.known} if not arrays else ():
-            off = s - float(point)
-            near = np.abs(off) * self.longest_delay <= (_NEAR if point in self.known else 0.0)
-            near |= off == 0.0
-            if near.any():
-                value = np.where(near, self._next_to(point, np.where(near, off, 0.0)), value)
+        if not arrays and (s == 0.0).any():
+            value = np.where(s == 0.0, self._limit_at_zero(), value)
         return value
 
     def quotient(
@@ -646,17 +678,12 @@ class System:
             value = np.asarray(n / m)
             return value, np.asarray((of_n + np.abs(value) * of_m) / np.abs(m))
 
-    def _next_to(self, point: fmpq, off: ComplexArray) -> ComplexArray:
-        """Return the values so far from a point, by the series there; inf at a pole."""
-        # All powers of s, and the first ones of the exponentials.
+    def _limit_at_zero(self) -> complex:
+        """Return the limit at s = 0; inf at a pole."""
         number = _TERMS + max(self.numerator.degree, self.denominator.degree)
-        n, m = (part.series(number, point) for part in (self.numerator, self.denominator))
-        first = min(order(n), order(m))
-        scale = next(filter(None, m[first:]), fmpq(1))
-        above, below = ([float(c / scale) for c in part[first:]] or [0.0] for part in (n, m))
-        with np.errstate(all="ignore"):
-            found = np.asarray(poly.polyval(off, above) / poly.polyval(off, below))
-        return np.where(np.isnan(found) & bool(above[0]), complex(np.inf), found)
+        n, m = (part.series(number) for part in (self.numerator, self.denominator))
+        above, below = next((pair for pair in zip(n, m, strict=True) if any(pair)), (0, 1))
+        return complex(rounded([above / below])[0] if below else np.inf)
 
     def __eq__(self, other: object) -> bool:
         """Whether both are the same expression: the same coefficients and delay objects."""
@@ -667,16 +694,15 @@ class System:
         return hash((self.numerator, self.denominator))
 
     def _content(self) -> tuple[Any, ...]:
-        return self.numerator, self.denominator, self.nominal, self.step, dict(self.known)
+        return self.numerator, self.denominator, self.nominal, self.step, self.at_zero
 
     def __getstate__(self) -> tuple[Any, ...]:
         """Return what makes the system."""
-        return *self._content(), self.others
+        return self._content()
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         """Take it back."""
-        self.numerator, self.denominator, self.nominal, self.step, known, self.others = state
-        self.known = known
+        self.numerator, self.denominator, self.nominal, self.step, self.at_zero = state
 
     def _equation(self, latex: bool = False) -> str:
         """Return the equation as one writes it."""
@@ -756,20 +782,11 @@ def _combined(combine: Callable[..., tuple[Sum, Sum]], *systems: Any) -> System:
     """Return what becomes of open loops, from all their numerators and denominators in turn."""
     given = [System.of(system) for system in systems]
     names = names_of(given)
-
-    def made(*some: System) -> System:
-        parts = ((system.numerator, system.denominator) for system in some)
-        above, below = combine(*chain.from_iterable(parts))
-        if not below:
-            raise ZeroDivisionError("the denominator of a system must not be zero")
-        known = [one.known for one in some]
-        if combine is _parallel and proportion(*(one.denominator for one in some)):
-            # The zeros of a denominator that is kept once, if both numerators have them.
-            both = {a: min(k, known[1][a]) for a, k in known[0].items() if a in known[1]}
-            return System(above, below, names, known=both)
-        return System(above, below, names, known=together(known))
-
-    return with_others(made, *given)
+    parts = ((system.numerator, system.denominator) for system in given)
+    above, below = combine(*chain.from_iterable(parts))
+    if not below:
+        raise ZeroDivisionError("the denominator of a system must not be zero")
+    return System(above, below, names)
 
 
 def names_of(systems: Iterable[System]) -> dict[str, float | None]:
@@ -788,11 +805,6 @@ def names_of(systems: Iterable[System]) -> dict[str, float | None]:
                 )
             names[name] = value if known is None else known
     return names
-
-
-def together(known: Iterable[Mapping[fmpq, int]]) -> dict[fmpq, int]:
-    """Return the zeros of products, of which each factor has some."""
-    return collected(zero for some in known for zero in some.items())
 
 
 def _parallel(n: Sum, m: Sum, p: Sum, q: Sum) -> tuple[Sum, Sum]:
@@ -818,8 +830,8 @@ def proportion(first: Sum, second: Sum) -> fmpq | None:
     return ratio if all(p == second.terms[k] * ratio for k, p in first.terms.items()) else None
 
 
-def _reduced(n: Sum, m: Sum) -> tuple[Sum, Sum]:
-    """Divide out the delay objects that all terms hold, and of N / M a common power of s."""
+def _reduced(n: Sum, m: Sum, powers: bool) -> tuple[Sum, Sum]:
+    """Divide out the delay objects that all terms hold, and if asked a common power of s."""
     terms = [*n.terms.items(), *m.terms.items()]
     if not terms:
         raise ValueError("an equation must not be zero everywhere")
@@ -830,14 +842,10 @@ def _reduced(n: Sum, m: Sum) -> tuple[Sum, Sum]:
             "the system must be causal: every term of its denominator is delayed by "
             f"{' and '.join(sorted({_number(lag.time) for lag, _ in (m or n).terms}))} s"
         )
-    power = _S ** (min(order(p.coeffs()) for _, p in terms) if m else 0)
-    if not early and power == _ONE:
+    power = min(order(p.coeffs()) for _, p in terms) if powers else 0
+    if not early and not power:
         return n, m
-    above, below = (
-        Sum({(lag.times(early), names): p // power for (lag, names), p in f.terms.items()})
-        for f in (n, m)
-    )
-    return above, below
+    return n.over(power, early), m.over(power, early)
 
 
 def delay(theta: float | Fraction) -> System:
@@ -876,52 +884,6 @@ def delay(theta: float | Fraction) -> System:
         raise ValueError(f"theta must not be negative, got {theta}")
     lag = Lag.of({Delay.new(value): 1}) if value else NOW
     return System(Sum.of(_ONE, lag), _UNITY)
-
-
-def distributed_delay(horizon: Any, rate: float | Fraction = 0.0) -> System:
-    r"""Return the delay over a horizon with exponential weights, which has no pole.
-
-    .. math::
-
-        \int_0^h e^{at} e^{-st}\, \mathrm{d}t = \frac{1 - e^{-(s - a) h}}{s - a}
-
-    Parameters
-    ----------
-    horizon : float, Fraction, or delay
-        h in s, positive; a delay as `delay` made it, to use the object that the loop has.
-    rate : float or Fraction, optional
-        a in rad/s. ``distributed_delay(h) / h`` is the uniform kernel.
-
-    Returns
-    -------
-    System
-        Whose numerator and denominator share the zero s = a. It is known (`System.known`), and
-        no count, root or value has it.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the horizon is no positive number and no delay, or the rate is not finite and real.
-
-    Examples
-    --------
-    The predictor of finite spectrum assignment, for an unstable process with a delay of 1 s:
-
-    >>> import math
-    >>> from armlock import delay, distributed_delay, rightmost_root, s
-    >>> z, gain = delay(1.0), 3.0
-    >>> predictor = gain * math.e / (1 + gain * distributed_delay(z, 1.0))
-    >>> print(f"{rightmost_root(predictor * z / (s - 1)):.6f}")
-    -2.000000+0.000000j
-    """
-    if not isinstance(horizon, System | Fraction):
-        horizon = positive_number("horizon", horizon)
-    late = horizon if isinstance(horizon, System) else delay(horizon)
-    one = delay_object(late, "horizon")
-    a = exact_number("rate", rate)
-    turned = Lag.of({one._replace(growth=a * one.theta): 1})
-    above = _UNITY + -Sum.of(_ONE, turned)
-    return System(above, Sum.of(fmpq_poly([-a, 1])), known={a: 1})
 
 
 def delay_object(system: System, name: str) -> Delay:
@@ -974,7 +936,7 @@ def parameter(name: str, nominal: float | None = None) -> System:
 s = System(Sum.of(_S), _UNITY)
 
 
-def equation(d: Any, step: float = 0.0) -> System:
+def equation(d: Any, step: float = 0.0, *, at_zero: int | None = None) -> System:
     r"""Return the equation D(s) = 0, whose own roots are counted.
 
     Parameters
@@ -984,6 +946,10 @@ def equation(d: Any, step: float = 0.0) -> System:
         has the roots of the loop L, and those that cancel at s = 0.
     step : float, optional
         The step in s of a map. D is then a sum of numbers times powers of ``delay(step)``.
+    at_zero : int, optional
+        How many roots are at s = 0, for all values of the parameters, and left out: those that
+        cancel, and one that is meant to be there, such as the agreement of a network. By
+        default no root is left out.
 
     Returns
     -------
@@ -993,8 +959,8 @@ def equation(d: Any, step: float = 0.0) -> System:
     Raises
     ------
     TypeError, ValueError
-        If D is zero or an equation already, all of it is delayed, or a map holds s, or delays
-        that are no multiples of its step.
+        If D is zero or an equation already, all of it is delayed, it has not as many roots at
+        s = 0 as stated, or a map holds s, or delays that are no multiples of its step.
 
     Examples
     --------
@@ -1005,6 +971,12 @@ def equation(d: Any, step: float = 0.0) -> System:
     >>> forced = equation(s**2 + 0.2 * s + 1 - k * delay(1.0))
     >>> unstable_roots(forced, [0.1, -0.5])
     array([0, 2])
+
+    A moving average is no pole, but 1 - exp(-s) is zero at s = 0:
+
+    >>> average = (1 - delay(1.0)) / s
+    >>> unstable_roots(equation(s + 2 * average, at_zero=1))
+    0
     """
     system = System.of(d, "d")
     if system.is_equation:
@@ -1015,6 +987,23 @@ def equation(d: Any, step: float = 0.0) -> System:
             whole_steps("delay", float(lag.time), step)
         if above.degree:
             raise ValueError("a map must hold no s: its terms are numbers times delays")
-    return with_others(
-        lambda one: System(one.numerator, Sum({}), one.nominal, step, one.known), system
-    )
+    return equation_of(above, system.nominal, at_zero, system.cancelled(), step)
+
+
+def equation_of(
+    d: Sum,
+    nominal: Mapping[str, float | None],
+    at_zero: int | None = None,
+    cleared: int = 0,
+    step: float = 0.0,
+) -> System:
+    """Return D = 0 without the roots at s = 0 that are stated, or raise.
+
+    Where rounding hides whether D(0) is zero, it has to be stated. So many roots at s = 0 come
+    from clearing denominators.
+    """
+    if not d:
+        raise ValueError("an equation must not be zero everywhere")
+    series = d.lowest(whole_number("at_zero", at_zero or 0, 0) + 1)
+    stated = settled("at_zero", at_zero, series, cleared=cleared)
+    return System(d.without(stated), Sum({}), nominal, step, stated)

@@ -28,10 +28,11 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.affine import Affine, common
+from armlock.affine import Affine
 from armlock.engine import chain, polynomials
 from armlock.engine.chain import Delay, Lag
 from armlock.engine.decide import count
+from armlock.engine.functions import common_zeros
 from armlock.engine.margins import gain_limits
 from armlock.engine.polynomials import Polynomial
 from armlock.robustness import perturbations
@@ -219,7 +220,7 @@ def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(
                 1 + polynomials.exact(share * eps) * polynomials.exact(d) for d in direction
             ]
             n, m = Affine.of(loop).quotient(*point)
-            found.append(count(n + m, common(n, m)))
+            found.append(count(n + m, common_zeros(n, m)))
         assert found == [0, 0, 0, 2]
 
 

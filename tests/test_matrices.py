@@ -1,33 +1,36 @@
-"""Several loops at once, state spaces with delays, and distributed delays."""
+"""Several loops at once, state spaces with delays, and roots at s = 0 that are stated."""
 
 import math
+import pickle
 import re
+from fractions import Fraction
 from typing import Any
 
 import control
-import mpmath
 import numpy as np
 import pytest
 
 from armlock import (
     BOUNDARY,
-    CountError,
     System,
+    box_count,
+    critical_perturbation,
     delay,
     determinant,
-    distributed_delay,
     equation,
+    first_crossing,
     margins,
     nyquist,
     parameter,
+    peak_gain,
     return_difference,
     rightmost_root,
     s,
+    stability_chart,
     state_space,
     unstable_roots,
 )
 from armlock.stability.semidiscretization import semi_discretization
-from armlock.systems import exponential
 from tests import independent
 
 # published systems ------------------------------------------------
@@ -86,7 +89,9 @@ def test_the_column_of_wood_and_berry(gains, times, count, first):
     assert unstable_roots(loops) == count
     product = np.array([[System.of(g) for g in row] for row in COLUMN], object)
     product = np.eye(2) + product @ np.array([[one, 0], [0, other]], object)
-    assert unstable_roots(determinant(product)) == count
+    # Each entry of the product has an integrator of its own, two more than there are loops.
+    assert unstable_roots(determinant(product)) == BOUNDARY
+    assert unstable_roots(determinant(product, at_zero=2)) == count
     if first:
         assert margins(loops.opened("k1")).gain_upper == pytest.approx(first, abs=5e-4)
 
@@ -226,21 +231,23 @@ def test_a_loop_is_opened_at_a_parameter():
 def test_rounding_that_may_hide_an_integrator_is_told():
     turn = np.array([[math.cos(0.7), -math.sin(0.7)], [math.sin(0.7), math.cos(0.7)]])
     a = turn @ np.diag([0.0, -0.3]) @ turn.T
-    poles = state_space({0.0: a - np.diag([0.1, 0.2]), 1.0: np.diag([0.1, 0.2])})
-    assert len(poles.others) == 3
-    assert not state_space(VERHEYDEN).others
+    parts = {0.0: a - np.diag([0.1, 0.2]), 1.0: np.diag([0.1, 0.2])}
+    with pytest.raises(ValueError, match="rounding hides whether more than 0 roots"):
+        state_space(parts)
+    assert unstable_roots(state_space(parts, integrators=1)) == BOUNDARY
+    assert unstable_roots(state_space(parts, at_zero=1)) == 0
+    assert unstable_roots(state_space(parts, integrators=1, at_zero=1)) == 0
     assert unstable_roots(state_space({0: [[-1.0]], 1: [[1.0]]})) == BOUNDARY
     # Two tanks, the flow from one to the other late: nothing leaves them.
     still, late = np.diag([-0.1, -0.3 - 0.2]), [[0.0, 0.3 + 0.2], [0.1, 0.0]]
     tanks = {0.0: turn @ still @ turn.T, 2.0: turn @ late @ turn.T}
     b, c = turn @ [1.0, 0.0], turn @ [0.0, 1.0]
     gain = 0.05
-    with pytest.raises(CountError, match=r"state_space\(\.\.\., integrators=1\)"):
-        unstable_roots(gain * state_space(tanks, b, c) * (1 - delay(3.0)))
+    with pytest.raises(ValueError, match=r"state_space\(\.\.\., integrators=0"):
+        state_space(tanks, b, c)
     meant = state_space(tanks, b, c, integrators=1)
-    assert not meant.others
     assert unstable_roots(gain * meant * (1 - delay(3.0))) == 0
-    with pytest.raises(ValueError, match="integrators must be 0, got 1"):
+    with pytest.raises(ValueError, match=r"integrators must be the number of poles .* got 1"):
         state_space(VERHEYDEN, integrators=1)
 
 
@@ -264,13 +271,10 @@ def test_rounding_that_may_hide_an_integrator_is_told():
         (lambda: return_difference([[1 / s]], [1, 1]), ValueError, "controllers must be 1 x 1"),
         (lambda: return_difference([[s]], [1]), ValueError, "must not have more zeros than"),
         (lambda: return_difference([[-1]], [1]), ValueError, "must be well posed"),
-        (lambda: distributed_delay(0.0), ValueError, "horizon must be positive"),
-        (lambda: distributed_delay(s), TypeError, "horizon must be what delay"),
-        (
-            lambda: semi_discretization(distributed_delay(1.0) / s, 0.1),
-            ValueError,
-            "got a distributed delay",
-        ),
+        (lambda: equation(s, at_zero=2), ValueError, "at_zero must be .* got 2: there are 1"),
+        (lambda: equation(s, at_zero=-1), ValueError, "at_zero must be"),
+        (lambda: equation(s, at_zero=True), ValueError, "at_zero must be an integer"),
+        (lambda: state_space([[0]], [1], [1], at_zero=1), TypeError, "with b and c, got 1"),
     ],
 )
 def test_what_is_refused(make, error, words):
@@ -329,91 +333,193 @@ def test_too_many_states_are_refused(monkeypatch):
         state_space({float(h): rng.normal(size=(20, 20)) for h in range(4)})
 
 
-# distributed delays ------------------------------------------------
+# roots at s = 0 ------------------------------------------------
 
 
-def kernel(at, h, a):
-    """The integral of exp(a t - s t) from 0 to h."""
-    x = (np.asarray(at, complex) - a) * h
+def kernel(at, h):
+    """The integral of exp(-s t) from 0 to h."""
+    x = np.asarray(at, complex) * h
     small = np.where(x == 0.0, 1.0, x)
     return np.where(np.abs(x) < 1e-5, h * (1 - x / 2 + x**2 / 6), -np.expm1(-small) / small * h)
 
 
-def test_finite_spectrum_assignment_has_one_root():
-    z, gain = delay(1.0), 3.0
-    loop = gain * math.e / (1 + gain * distributed_delay(z, 1.0)) * z / (s - 1)
-    for system in (loop, equation(1 + loop)):
-        assert unstable_roots(system) == 0
-        assert rightmost_root(system) == pytest.approx(-2.0, abs=1e-12)
-    inside = independent.winding(lambda at: 1 + gain * kernel(at, 1.0, 1.0), 100.0, 1.0)
-    assert inside == 2
-    # Those of the controller, and the pole of the plant.
-    assert nyquist(loop).open_loop_poles == 3
-    assert margins(loop).gain_lower < 1.0 < margins(loop).gain_upper
+def averaging(h):
+    return (1 - delay(h)) / s
 
 
 def test_the_uniform_kernel_is_stable_below_a_known_gain():
     k, limit = parameter("k", 2.0), math.pi**2 / 4.0
-    loop = k / s * distributed_delay(2.0) / 2.0
-    for system in (loop, equation(1 + loop)):
+    loop = k / s * averaging(2.0) / 2.0
+    for system in (loop, equation(1 + loop, at_zero=1)):
         gains = np.array([0.1, 0.999 * limit, 1.001 * limit])
         assert unstable_roots(system, gains).tolist() == [0, 0, 2]
         assert [unstable_roots(system, g) for g in gains] == [0, 0, 2]
         assert abs(rightmost_root(system, limit).real) < 1e-10
+    assert unstable_roots(equation(1 + loop), 1.0) == BOUNDARY
     assert margins(loop, 1.0).gain_upper == pytest.approx(limit, rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_loops_with_distributed_delays_are_counted_without_their_known_zeros(seed):
-    """L = k exp(-s d) Q_1 (1 + g Q_2) / (s + p), with two distributed delays Q."""
+def test_loops_with_moving_averages_are_counted_without_their_zeros(seed):
+    """L = k exp(-s d) Q_1 (1 + g Q_2) / (s + p), with two moving averages Q."""
     rng = np.random.default_rng(seed)
-    (h, h2), a, d = rng.uniform(0.2, 2.0, 2), float(rng.uniform(-1.0, 2.0)), 0.3
-    a2 = a if seed % 3 else float(rng.uniform(-1.0, 1.0))
+    (h, h2), d = rng.uniform(0.2, 2.0, 2), 0.3
     k, g, p = rng.normal(size=3) * (3.0, 1.0, 1.0)
-    first, second = distributed_delay(h, a), distributed_delay(h2, a2)
+    first, second = averaging(h), averaging(h2)
     loop = k * delay(d) * first * (1 + g * second) / (s + p)
 
     def closed(at):
-        whole = at + p + k * np.exp(-at * d) * kernel(at, h, a) * (1 + g * kernel(at, h2, a2))
+        whole = at + p + k * np.exp(-at * d) * kernel(at, h) * (1 + g * kernel(at, h2))
         return whole / (1 + abs(at))
 
     count = independent.winding(closed, 300.0, 5.0)
-    assert unstable_roots(loop) == unstable_roots(equation(1 + loop)) == count
-    root = rightmost_root(loop)
-    assert abs(closed(root)) < 1e-9
-    assert (root.real > 0) == (count > 0)
-    if root.imag:
-        at = root.real - 1e-3
-        assert unstable_roots(loop, right_of=at) >= 2
-    assert unstable_roots(loop, right_of=root.real + 1e-6) == 0
-    # Next to a known zero the value is that of the integral.
-    near = a + np.array([0.0, 1e-9, 1e-3, 0.03j])
-    assert first(near) == pytest.approx(kernel(near, h, a), rel=1e-9)
+    several = return_difference([[loop]], [1], at_zero=2)
+    for system in (loop, equation(1 + loop, at_zero=2), several):
+        assert unstable_roots(system) == count
+        root = rightmost_root(system)
+        assert abs(closed(root)) < 1e-9
+        assert (root.real > 0) == (count > 0)
+        if root.imag:
+            assert unstable_roots(system, right_of=root.real - 1e-3) >= 2
+        assert unstable_roots(system, right_of=root.real + 1e-6) == 0
+    for fewer in (0, 1):
+        assert unstable_roots(equation(1 + loop, at_zero=fewer)) == BOUNDARY
+    with pytest.raises(ValueError, match=r"got 3: there are 2 .* denominators makes 2"):
+        equation(1 + loop, at_zero=3)
+    # Next to s = 0 the value is that of the integral.
+    near = np.array([0.0, 1e-9, 1e-3, 0.03j])
+    assert first(near) == pytest.approx(kernel(near, h), rel=1e-12)
     assert loop(near) == pytest.approx(
-        k
-        * np.exp(-near * d)
-        * kernel(near, h, a)
-        * (1 + g * kernel(near, h2, a2))
-        / (near + p),
-        rel=1e-8,
+        k * np.exp(-near * d) * kernel(near, h) * (1 + g * kernel(near, h2)) / (near + p),
+        rel=1e-10,
     )
 
 
-def test_a_pole_at_a_known_zero_counts():
-    """Of (Q + 1/(s - 1)) the pole is a pole; of Q times 1/(s - 1) too."""
-    q, p = distributed_delay(1.0, 1.0), 1 / (s - 1)
-    assert (q + p).known == {}
-    assert unstable_roots(equation(1 / (q + p))) == 1
-    assert unstable_roots(equation(1 / (q * p))) == 1
-    assert unstable_roots(equation(1 / q)) == 0
-    assert (q * p)(1.0) == complex(np.inf)
+def test_a_root_at_zero_is_counted_until_it_is_stated():
+    late = s * averaging(1.0)
+    made = equation(late / (s + 2) + s / (s + 1))
+    assert unstable_roots(made) == BOUNDARY
+    assert rightmost_root(made) == 0.0
+    rest = equation(late / (s + 2) + s / (s + 1), at_zero=1)
+    assert unstable_roots(rest) == 0
+    assert rightmost_root(rest) == pytest.approx(-1.3242798054, abs=1e-9)
+    same = [equation(1 + late / (s + 2)), equation(s + 3 - delay(1.0))]
+    assert rightmost_root(same[0]) == rightmost_root(same[1])
+    d = averaging(0.2)
+    for number, count in ((None, BOUNDARY), (2, BOUNDARY), (3, 0)):
+        pair = determinant([[s - 0.2 + d, 0], [d, s + 1]], at_zero=number)
+        assert unstable_roots(pair) == count
 
 
-def test_exponentials_are_exact_until_they_are_rounded():
-    q, z = distributed_delay(1.0, 0.3), delay(2.0)
-    assert (q - q).numerator.terms == {}
-    assert equation(z + q * q).known == {next(iter(q.known)): 2}
-    with mpmath.workprec(600):
-        x = next(iter(q.numerator.lags - {()})).time * 0 + next(iter(q.known))
-        value, exact = exponential(x), mpmath.exp(mpmath.mpf(int(x.p)) / int(x.q))
-        assert abs(mpmath.mpf(int(value.p)) / int(value.q) / exact - 1) < mpmath.mpf(2) ** -511
+def test_moving_averages_in_a_matrix_are_stated():
+    a = averaging(2.0) / 2.0
+    plant = [[a / (s + 1), a / (s + 2)], [a / 2 / (s + 3), a / (s + 0.5)]]
+    found = return_difference(plant, [1, 2], at_zero=2)
+    assert unstable_roots(found) == 0
+    assert rightmost_root(found) == pytest.approx(-0.28596183 + 1.66245312j, abs=1e-8)
+
+    def d(at):
+        p = [[kernel(at, 2.0) / 2 / (at + 1), kernel(at, 2.0) / 2 / (at + 2)],
+             [kernel(at, 2.0) / 4 / (at + 3), kernel(at, 2.0) / 2 / (at + 0.5)]]  # fmt: skip
+        return (1 + p[0][0]) * (1 + 2 * p[1][1]) - 2 * p[0][1] * p[1][0]
+
+    assert abs(d(rightmost_root(found))) < 1e-12
+    # The poles at -1, -2, -3 and -0.5 lie left of neither line.
+    for line in (-0.2, -0.4):
+        count = independent.winding(lambda at, line=line: d(at + line), 300.0, 5.0)
+        assert unstable_roots(found, right_of=line) == count
+    with pytest.raises(ValueError, match=r"got 3: there are 2 .* clearing .* makes 2"):
+        return_difference(plant, [1, 2], at_zero=3)
+
+
+def test_a_hidden_integrator_counts():
+    def loops(pole, first=1, **stated):
+        plant = [[first / (s + 1), 0], [0, 1 / (s - pole)]]
+        return return_difference(plant, [[1, 0], [0, 0]], **stated)
+
+    assert [unstable_roots(loops(pole)) for pole in (-1, 0, 1)] == [0, BOUNDARY, 1]
+    assert unstable_roots(loops(0, at_zero=1)) == 0
+    # Clearing the average makes one of two.
+    average = averaging(1.0)
+    counts = [unstable_roots(loops(0, average, at_zero=k)) for k in range(3)]
+    assert counts == [BOUNDARY, BOUNDARY, 0]
+    with pytest.raises(ValueError, match=r"got 3: there are 2 .* clearing .* makes 1"):
+        loops(0, average, at_zero=3)
+    # Two entries of a row are two systems, with an integrator each.
+    row = [[1 / s, 1 / (s * (s + 1))], [0, 0]]
+    assert unstable_roots(return_difference(row, [[1, 0], [1, 0]])) == BOUNDARY
+
+
+def ring(weight=1, **stated):
+    neighbours = np.roll(np.eye(4), 1, 0) + np.roll(np.eye(4), -1, 0)
+    return lambda tau: state_space({tau: weight * (neighbours - 2 * np.eye(4))}, **stated)
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.1, 0.3, 2.7])
+def test_consensus_on_a_ring_of_four(weight):
+    # The eigenvalue 4 of the Laplacian reaches the axis first.
+    limit = math.pi / 8.0 / weight
+    counts = [unstable_roots(ring(weight, at_zero=1)(x * limit)) for x in (0.999, 1.001)]
+    assert counts == [0, 2]
+    assert unstable_roots(ring(weight)(0.5 * limit)) == BOUNDARY
+
+
+def test_weights_in_decimals_leave_the_agreement_to_be_stated():
+    late = [[-0.3, 0.1, 0.2], [0.3, -0.4, 0.1], [0.6, 0.1, -0.7]]
+    z = delay(0.3)
+    rows = [[s * int(i == k) - late[i][k] * z for k in range(3)] for i in range(3)]
+    for make in (
+        lambda **stated: determinant(rows, **stated),
+        lambda **stated: state_space({0.3: late}, **stated),
+        lambda **stated: equation(s + 0.3 * z - 0.1 * z - 0.2 * z, **stated),
+        lambda **stated: equation(s + 0.1 * z + 0.2 * z - 0.3 * z, **stated),
+        lambda **stated: equation(s + Fraction(0.3) * z - (0.1 + Fraction(0.2)) * z, **stated),
+    ):
+        with pytest.raises(ValueError, match=r"rounding hides .* or at_zero=0 of an equation"):
+            make()
+        meant = make(at_zero=1)
+        assert meant.numerator.order() == 1
+        if len(meant.numerator.terms) > 1:
+            assert unstable_roots(meant) == 0
+        # Zero says that the numbers hold as they are.
+        assert unstable_roots(make(at_zero=0)) in (0, 1)
+        with pytest.raises(ValueError, match="got 2: there are 0 exactly and 1 within"):
+            make(at_zero=2)
+    # Two groups: with one of two stated the sign of D'(0) is rounding still.
+    two = np.kron(np.eye(2), late)
+    with pytest.raises(ValueError, match="more than 1 roots"):
+        state_space({0.3: two}, at_zero=1)
+    assert unstable_roots(state_space({0.3: two}, at_zero=2)) == 0
+
+
+def test_what_is_stated_holds_for_all_parameters_and_stays():
+    k, q = parameter("k", 1.0), parameter("q", 1.0)
+    loop = k * averaging(1.0) / (s + q)
+    made = equation(1 + loop, at_zero=1)
+    assert made.at_zero == made.at(k=2.0).at_zero == 1
+    assert pickle.loads(pickle.dumps(made)) == made != equation(1 + loop)
+    gains = np.linspace(-4.0, 30.0, 9)
+    assert unstable_roots(made, k=gains).tolist() == unstable_roots(loop, k=gains).tolist()
+    poles = [-0.5, 0.25, 1.0]
+    charts = [stability_chart(x, k=gains, q=poles).counts for x in (made, loop)]
+    assert charts[0].tolist() == charts[1].tolist()
+    assert box_count(made, 0.2) == box_count(loop, 0.2) == 0
+    assert critical_perturbation(made, {"k": 1}) == critical_perturbation(loop, {"k": 1})
+    crossings = [first_crossing(x, {}, {"k": -1}) for x in (made, loop)]
+    assert crossings[0] == crossings[1]
+    assert repr(margins(made.opened("k"))) == repr(margins(loop))
+    assert peak_gain(1 / (1 + made.opened("k"))) == peak_gain(1 / (1 + loop))
+    assert nyquist(made.opened("k")).encirclements == 0
+    difference = equation(s + k * delay(1.0) - k * delay(2.0), at_zero=1)
+    found = semi_discretization(difference, 0.05)
+    assert found.at_zero == 1
+    gains = np.array([-1.5, -0.5, 0.5, 4.0])
+    assert unstable_roots(found, gains).tolist() == unstable_roots(difference, gains).tolist()
+    assert unstable_roots(difference, gains).tolist() == [1, 0, 0, 2]
+    with pytest.raises(ValueError, match="at_zero must be 0 or 1: a map keeps one root"):
+        semi_discretization(equation(s**2 * (s + delay(1.0)), at_zero=2), 0.1)
+    # A root that is not stated stays in the open loop, and is named.
+    with pytest.raises(ValueError, match="has 1 roots at s = 0 for all values of k, got at_z"):
+        equation(1 + loop).opened("k")
+    hidden = determinant([[s + k, 0], [0, s + q]], at_zero=0)
+    assert unstable_roots(hidden.opened("k"), q=0.0) == BOUNDARY

@@ -39,13 +39,11 @@ class Delay(NamedTuple):
     """A delay object: theta in s, and the mark by which it differs from all others.
 
     Two objects are two delays even if they are equally long: a small change of one of them
-    alone is a small change of the loop. The mark is the same in other processes. With a growth
-    x it stands for exp(x) times the delay.
+    alone is a small change of the loop. The mark is the same in other processes.
     """
 
     theta: fmpq
     mark: str
-    growth: fmpq = fmpq(0)
 
     @classmethod
     def new(cls, theta: fmpq) -> Self:
@@ -80,16 +78,6 @@ class Lag(tuple[tuple[Delay, int], ...]):
     def time(self) -> fmpq:
         """The delay of the product, in s."""
         return sum((delay.theta * n for delay, n in self), fmpq(0))
-
-    @cached_property
-    def growth(self) -> fmpq:
-        """The x of the factor exp(x) before the delay."""
-        return sum((delay.growth * n for delay, n in self), fmpq(0))
-
-    @property
-    def plain(self) -> Lag:
-        """The product without that factor."""
-        return Lag.of(collected((Delay(one.theta, one.mark), n) for one, n in self))
 
 
 #: The product of no delays.

@@ -122,7 +122,6 @@ def counts(
         sure = np.isnan(undecided) & (np.abs(number - np.round(number)) < 1e-2)
         found[here] = np.where(sure & (number > -0.5), np.round(number), BOUNDARY)
     found[here[steps >= most]] = UNDECIDED
-    found[found >= 0] -= space.known_right_of(0.0)
     return found
 
 
@@ -181,8 +180,7 @@ def count(
     if right_of:
         found = int(counts(*function.shifted(right_of), most=most)[0])
         if found >= 0:
-            known = function.space.known_right_of(right_of)
-            found -= known + (common if right_of < 0.0 else 0)
+            found -= common if right_of < 0.0 else 0
     else:
         leading = function.leading()
         if leading is None or leading.order > common:

@@ -10,11 +10,10 @@ of the imaginary axis: a frequency past which one term exceeds all others.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import mpmath
@@ -73,9 +72,9 @@ class Space:
     step : float, optional
         Sampling step in s of which all delays are multiples, if the functions are those of a
         map. They repeat along the axis, which then ends at pi / step.
-    known : mapping of fmpq to int, optional
-        Real numbers at which all functions have a zero, and its order at least: zeros that are
-        no roots of the system (Lemma 23).
+    at_zero : int, optional
+        How many zeros at s = 0 of N + M are stated and left out. By default these are the ones
+        that N and M have in common.
     """
 
     def __init__(
@@ -83,10 +82,10 @@ class Space:
         polynomials: Sequence[Polynomial],
         lags: Iterable[Lag],
         step: float = 0.0,
-        known: Mapping[fmpq, int] = MappingProxyType({}),
+        at_zero: int | None = None,
     ) -> None:
         self.polynomials = tuple(polynomials)
-        self.step, self.known = step, known
+        self.step, self.at_zero = step, at_zero
         #: Products of delay objects, by their length, one for each column of W.
         self.lags = tuple(
             sorted(
@@ -126,11 +125,6 @@ class Space:
         #: Sizes of roots and of one over the longest delay, ascending, in rad/s.
         self.corners = np.unique(np.append(sizes[sizes > 0.0], unit))
         self.sums = np.abs(roots).sum(axis=1)
-
-    def known_right_of(self, sigma: float) -> int:
-        """How many of the known zeros, but those at s = 0, have a larger real part."""
-        line = exact(sigma)
-        return sum(k for a, k in self.known.items() if a != 0 and a > line)
 
     def around_roots(self, number: int = 200) -> FloatArray:
         """Frequencies around complex roots, closest where a function changes most.
@@ -434,7 +428,9 @@ class Function:
 
 
 def common_zeros(n: Function, m: Function) -> int:
-    """Order of the zero at s = 0 that two functions have in common."""
+    """How many zeros of N + M at s = 0 are left out: those in common, or those stated."""
+    if n.space.at_zero is not None:
+        return n.space.at_zero
     return min((f.lowest[0] for f in (n, m) if f.lowest), default=0)
 
 

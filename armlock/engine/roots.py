@@ -8,19 +8,18 @@ last count says that no zero lies further right.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import mpmath
 import numpy as np
-from flint import fmpq, fmpq_poly
+from flint import fmpq_poly
 
 from armlock.checks import ComplexArray, FloatArray
 from armlock.engine import chain, decide, inclusion
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, Space
-from armlock.engine.polynomials import Polynomial, in_mpmath
+from armlock.engine.polynomials import Polynomial
 
 # How far right of the zero that is returned no other one lies: the first share of abs(s), or of
 # one over the longest delay, if so fine a count is decided in so few steps. Otherwise it is the
@@ -42,18 +41,12 @@ _TURNS_FURTHER, _MOST_TURNS_FURTHER = 4.0, 3e4
 _STEPS, _EXTENDED_STEPS, _MULTIPLE_STEPS = 12, 100, 50
 # Most zeros near a line that are tried in extended precision.
 _MOST_TRIED = 8
-# Next to a known zero, to this share, none is looked for.
-_NEXT_TO_KNOWN = 1e-4
 # Zeros down to so many times one over the longest delay are looked for in steps of their size.
 _SLOWEST = 1e-9
 # So many times one over the longest delay left of the axis an exponential is no float.
 _LARGEST_EXPONENT = 600.0
 # Digits of a zero, and those that cancelling terms and multiple zeros take besides.
 _DIGITS, _GUARD_DIGITS = 20, 80
-
-
-#: Real numbers at which a function has zeros that are left out, and their orders.
-_Known = Mapping[fmpq, int]
 
 
 class RootError(RuntimeError):
@@ -79,8 +72,8 @@ class RootError(RuntimeError):
         return type(self), (str(self), self.estimate)
 
 
-def _polished(function: Function, known: _Known, start: complex) -> complex | None:
-    """Follow Newton's method for F without known zeros in extended precision to a zero.
+def _polished(function: Function, common: int, start: complex) -> complex | None:
+    """Follow Newton's method for F / s^common in extended precision to a zero.
 
     Of a pair it is the upper one. None if the method does not settle.
     """
@@ -90,13 +83,11 @@ def _polished(function: Function, known: _Known, start: complex) -> complex | No
         digits = mpmath.mpf(10) ** -_DIGITS
         for step in range(_EXTENDED_STEPS):
             value, slope = function.exact_value_and_slope(s)
-            # Of the zeros a fraction is known exactly.
-            away = [(s - in_mpmath(a), k) for a, k in known.items()]
-            if any(abs(d) <= mpmath.eps * abs(s) for d, _ in away):
+            if common and s == 0:
                 return None
             if value == 0:
                 break
-            slope = slope / value - sum(k / d for d, k in away)
+            slope = slope / value - (common / s if common else 0)
             if slope == 0:
                 return None
             move = 1 / slope
@@ -129,11 +120,10 @@ class _Line(NamedTuple):
 
 
 class _Search:
-    """A search for the rightmost zero that is not known, and how many steps it has taken."""
+    """A search for the rightmost zero of F / s^common, and how many steps it has taken."""
 
-    def __init__(self, function: Function, known: _Known) -> None:
-        self.function, self.known, self.steps = function, known, 0.0
-        self.common = known.get(fmpq(0), 0)
+    def __init__(self, function: Function, common: int) -> None:
+        self.function, self.common, self.steps = function, common, 0.0
         self.unit = 1.0 / function.space.longest
         self.further, self.points = _TURNS_FURTHER, 0
 
@@ -184,13 +174,12 @@ class _Search:
         return found
 
     def _moved(self, s: ComplexArray, move: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-        """Return where Newton's method for F without known zeros leads, and how far.
+        """Return where Newton's method for F / s^common leads, and how far.
 
         `move` is F over its derivative at s.
         """
         with np.errstate(all="ignore"):
-            known = [k * move / (s - float(a)) for a, k in self.known.items()]
-            move = move / (1.0 - sum(known)) if known else move
+            move = move / (1.0 - self.common * move / s) if self.common else move
             length = np.abs(move)
         return s - move, np.where(np.isnan(length), np.inf, length)
 
@@ -227,13 +216,10 @@ class _Search:
         found = s[
             length <= np.minimum(1e-5 * line.turn, 1e-3 * np.abs(s) + _SLOWEST * line.turn)
         ]
-        for a in filter(None, map(float, self.known)):
-            # Next to a known zero all is rounding.
-            found = found[np.abs(found - a) > _NEXT_TO_KNOWN * max(abs(a), self.unit)]
         for top in found[np.argsort(-found.real, kind="stable")][:_MOST_TRIED]:
             equal = found[found.real >= top.real - _FINEST * max(abs(top), self.unit)]
             lowest = equal[np.argmin(np.abs(equal.imag))]
-            root = _polished(self.function, self.known, complex(lowest))
+            root = _polished(self.function, self.common, complex(lowest))
             if root is not None:
                 return root, root.real + float(top.real - lowest.real)
         return None
@@ -271,14 +257,13 @@ def _last_crossing(space: Space, steady: FloatArray, delayed: FloatArray) -> flo
     return float(omega[min(met[-1] + 1, 499)]) if met.size else 2.0 * np.pi / space.longest
 
 
-def _without_delay(function: Function, known: _Known) -> complex:
+def _without_delay(function: Function, common: int) -> complex:
     """Return the rightmost zero of a function that no delay acts on."""
     parts = zip(function.space.polynomials, function.steady, strict=True)
     whole = sum((weight * p.exact for p, weight in parts), fmpq_poly([0]))
-    for a, k in known.items():
-        whole //= fmpq_poly([-a, 1]) ** k
+    whole //= fmpq_poly([0, 1]) ** common
     starts = Polynomial.of(whole).roots if whole else ()
-    roots = [_polished(function, known, s) for s in starts]
+    roots = [_polished(function, common, s) for s in starts]
     if not roots:
         raise ValueError("the parameters must leave a loop with roots: D is constant")
     if None in roots:
@@ -299,7 +284,7 @@ def rightmost_zero(function: Function, common: int = 0) -> complex:
     function : Function
         Not zero.
     common : int, optional
-        Order of a zero at s = 0 that is left out, as the known zeros of the space are.
+        Order of a zero at s = 0 that is left out.
 
     Raises
     ------
@@ -308,11 +293,9 @@ def rightmost_zero(function: Function, common: int = 0) -> complex:
     RootError
         If no zero is certified.
     """
-    known = {**function.space.known, fmpq(0): common}
-    known = {a: k for a, k in known.items() if k}
     if not function.delayed.any():
-        return _without_delay(function, known)
-    search, best = _Search(function, known), complex(np.nan, np.nan)
+        return _without_delay(function, common)
+    search, best = _Search(function, common), complex(np.nan, np.nan)
     # There are zeros right of `low`, as far as is decided, and none right of `high`.
     first = search.first_line()
     low, high, sigma, width = -np.inf, np.inf, max(0.0, first), search.unit

@@ -1,134 +1,141 @@
-"""State spaces as quotients of polynomials, exactly, and which poles may be meant to be zero.
+"""State spaces as quotients of polynomials, exactly, and which coefficients may be rounding.
 
 With one input and one output two characteristic polynomials are enough,
 
     C adj(s - A) B = det(s - A + B C) - det(s - A) .
 
-Where rounding of the matrices may have moved a pole or a zero from s = 0, the quotient is *in
-doubt*: it comes with bounds of its lowest coefficients. A system that is made of it keeps as
-its `others` what it is for the values -bound, 0 and +bound. A count has to be the same for all.
+Rounding of the matrices may have moved a pole or a zero from s = 0. Then its lowest coefficient
+is not zero, but smaller than what rounding makes of it. `settled` refuses such a system until
+it is stated how many poles and zeros are meant to be at s = 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import product
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Iterable, Sequence
+from itertools import islice
+from typing import Any, NamedTuple
 
 import flint
 from flint import fmpq, fmpq_poly
 
 from armlock.checks import whole_number
-from armlock.engine.polynomials import Polynomial, exact
-
-_System = TypeVar("_System", bound=Any)
+from armlock.engine.polynomials import Polynomial, exact, polynomial
 
 #: What rounding makes of a determinant: at most this share of sum |a_ij cofactor_ij|. It covers
 #: all changes of coordinates that were drawn, of two to five states.
 ROUNDED = fmpq(512, 2**53)
-#: So many poles may be in doubt.
-MOST_IN_DOUBT = 2
+# So many of the lowest coefficients are asked.
+_ASKED = 3
+# What is counted by each number that may be stated.
+_COUNTED = {"integrators": "poles", "zeros": "zeros", "at_zero": "roots"}
 
 
-class Quotient(NamedTuple):
-    """Numerator and denominator, and bounds of their lowest coefficients that are in doubt.
+class Lowest(NamedTuple):
+    """The lowest coefficients of a series at s = 0, and what rounding may make of each."""
 
-    A bound is what rounding may make of a coefficient that is meant to be zero; it is zero
-    where the coefficient is.
+    coefficients: Sequence[fmpq]
+    bounds: Sequence[fmpq]
+
+    def is_sure(self, k: int) -> bool:
+        """Tell whether a coefficient is larger than what rounding makes of it."""
+        return bool(self.coefficients[k]) and abs(self.coefficients[k]) >= self.bounds[k]
+
+
+def settled(
+    name: str, number: int | None, series: Sequence[Lowest], *, cleared: int = 0
+) -> int:
+    """Return how many of the lowest coefficients are meant to be zero, or raise.
+
+    A number that is stated sets so many coefficients to zero, of all series. The next one must
+    not be rounding. If zero is stated, it is taken as it is.
+
+    Parameters
+    ----------
+    name : {"integrators", "zeros", "at_zero"}
+        What is stated.
+    number : int or None
+        How many poles, zeros or roots of an equation are at s = 0; None if it is not stated.
+    series : sequence of Lowest
+        Of all products of parameters, beginning with what stands before none.
+    cleared : int, optional
+        How many roots at s = 0 come from clearing denominators.
     """
-
-    above: Polynomial
-    below: Polynomial
-    below_bounds: tuple[fmpq, ...] = ()
-    above_bounds: tuple[fmpq, ...] = ()
-
-    def stated(self, integrators: int | None, zeros: int | None) -> Quotient:
-        """Return the quotient with so many poles and zeros at s = 0, or raise.
-
-        None leaves them in doubt.
-        """
-        above, below, below_bounds, above_bounds = self
-        if integrators is not None:
-            number = _stated("integrators", integrators, below, below_bounds)
-            above, below = _with_lowest(above, below, [fmpq(0)] * number)
-            below_bounds = ()
-        if zeros is not None:
-            number = _stated("zeros", zeros, above, above_bounds)
-            above = Polynomial.of(above.exact - fmpq_poly(above.exact.coeffs()[:number]))
-            above_bounds = ()
-        return Quotient(above, below, below_bounds, above_bounds)
-
-    def others(self) -> Iterator[tuple[Polynomial, Polynomial]]:
-        """Return what else may be meant; nothing if nothing is in doubt."""
-        if not any((*self.below_bounds, *self.above_bounds)):
-            return
-        for lowest in _around(self.below_bounds):
-            other, changed = _with_lowest(self.above, self.below, lowest)
-            for lowest_above in _around(self.above_bounds):
-                moved = [new - self.above.exact[k] for k, new in enumerate(lowest_above)]
-                above = Polynomial.of(other.exact + fmpq_poly(moved))
-                if above:
-                    yield above, changed
-
-
-def with_others(make: Callable[..., _System], *systems: Any) -> _System:
-    """Return what a function makes of systems, and as its `others` what it makes of theirs."""
-    found = make(*systems)
-    if any(system.others for system in systems):
-        chosen = product(*(system.others or (system,) for system in systems))
-        others = dict.fromkeys(make(*some) for some in chosen)
-        object.__setattr__(found, "others", tuple(others))
-    return found
-
-
-def _around(bounds: Sequence[fmpq]) -> Iterator[tuple[fmpq, ...]]:
-    """Return the values of coefficients that may be meant to be zero."""
-    return product(*((-bound, fmpq(0), bound) if bound else (bound,) for bound in bounds))
-
-
-def _stated(name: str, given: int, p: Polynomial, bounds: Sequence[fmpq]) -> int:
-    """Return how many roots at s = 0 are stated, or raise if p has no such coefficients."""
-    number = whole_number(name, given, 0)
-    lowest = p.exact.coeffs()[:number]
-    small = [not c or (k < len(bounds) and bounds[k]) for k, c in enumerate(lowest)]
-    if not all(small) or not p.exact[number]:
-        what = {"integrators": "poles", "zeros": "zeros"}[name]
+    stated = whole_number(name, number or 0, 0)
+    size = len(series[0].coefficients)
+    sure = [any(one.is_sure(k) for one in series) for k in range(size)]
+    zero = [not any(one.coefficients[k] for one in series) for k in range(size)]
+    most = sure.index(True) if any(sure) else size
+    is_root = name == "at_zero"
+    if stated > most or (number is not None and not is_root and zero[stated]):
+        made = f", of which clearing denominators makes {cleared}" if is_root else ""
         raise ValueError(
-            f"{name} must be the number of {what} that are zero but for rounding, got {given} "
-            f"for coefficients {p!r:.200}"
+            f"{name} must be the number of {_COUNTED[name]} at s = 0 but for rounding, got "
+            f"{number}: there are {zero.index(False) if False in zero else size} exactly and "
+            f"{most} within rounding{made}"
         )
-    return number
+    after = stated
+    # An equation with a root at s = 0 that is not left out has the count -1 in any case.
+    while not is_root and after < size and zero[after]:
+        after += 1
+    if number != 0 and after < size and not zero[after]:
+        first = series[0]
+        if (first.coefficients[after] and not first.is_sure(after)) or not sure[after]:
+            raise ValueError(
+                f"rounding hides whether more than {after} {_COUNTED[name]} are at s = 0: "
+                "state how many are meant, 0 if the numbers hold as they are, by "
+                "Controller.of(system, integrators=0, zeros=0), state_space(..., "
+                "integrators=0, zeros=0), or at_zero=0 of an equation, determinant or "
+                "return_difference; or give its factors, Controller(zeros, poles, gain)"
+            )
+    return stated
 
 
-def _with_lowest(
-    above: Polynomial, below: Polynomial, lowest: Sequence[fmpq]
-) -> tuple[Polynomial, Polynomial]:
-    """Return the quotient with other lowest coefficients of the denominator.
-
-    What goes through directly stays as it is.
-    """
-    through = above.lead / below.lead if above.degree == below.degree else fmpq(0)
-    change = fmpq_poly([new - below.exact[k] for k, new in enumerate(lowest)])
-    return Polynomial.of(above.exact + through * change), Polynomial.of(below.exact + change)
-
-
-def of_matrices(a: Any, b: Any, c: Any, d: Any) -> Quotient:
-    """Return C (s - A)^-1 B + D of matrices of floats."""
+def of_matrices(
+    matrices: Sequence[Any], integrators: int | None, zeros: int | None
+) -> tuple[fmpq_poly, fmpq_poly]:
+    """Return numerator and denominator of C (s - A)^-1 B + D of matrices of floats."""
+    a, b, c, ((d,),) = matrices
     if not len(a):
-        return Quotient(Polynomial.of(d[0]), Polynomial.of([1]))
-    first, column, row = _matrix(a), _matrix(b), _matrix(c)
-    below = first.charpoly()
-    above = (first - column * row).charpoly() - below + exact(d[0][0]) * below
-    above = Polynomial.of(above)
-    return Quotient(
-        above, Polynomial.of(below), _doubts(a), _doubts_of_zeros(a, b, c, d[0][0], above)
-    )
+        return polynomial([d]), polynomial([1])
+    first, column, row, through = _matrix(a), _matrix(b), _matrix(c), exact(d)
+    coefficients, adjugates = _cofactors(first)
+    below = fmpq_poly(coefficients)
+    above = (first - column * row).charpoly() - below + through * below
+    bounds = _bounds(adjugates, first), _bounds_of_zeros(a, b, c, d, above)
+    return _quotient(above, below, through, (integrators, zeros), bounds)
 
 
-def of_coefficients(above: Any, below: Any) -> Quotient:
+def of_coefficients(
+    above: Any, below: Any, integrators: int | None, zeros: int | None
+) -> tuple[fmpq_poly, fmpq_poly]:
     """Return a quotient of polynomials that were multiplied out, in ascending powers."""
-    denominator = Polynomial.of(below)
-    return Quotient(Polynomial.of(above), denominator, _doubts_of_roots(denominator))
+    above, below = polynomial(above), polynomial(below)
+    through = above[below.degree()] / below.leading_coefficient()
+    bounds = _bounds_of_product(below), _bounds_of_product(above)
+    return _quotient(above, below, through, (integrators, zeros), bounds)
+
+
+def _quotient(
+    above: fmpq_poly,
+    below: fmpq_poly,
+    through: fmpq,
+    numbers: tuple[int | None, int | None],
+    bounds: tuple[Sequence[fmpq], Sequence[fmpq]],
+) -> tuple[fmpq_poly, fmpq_poly]:
+    """Return numerator and denominator with as many poles and zeros at s = 0 as are stated."""
+    moved = _rounding("integrators", numbers[0], below, bounds[0])
+    # What goes through directly stays as it is.
+    above, below = above - through * moved, below - moved
+    return above - _rounding("zeros", numbers[1], above, bounds[1]), below
+
+
+def _rounding(name: str, number: int | None, p: fmpq_poly, bounds: Sequence[fmpq]) -> fmpq_poly:
+    """Return the lowest terms of a polynomial that are meant to be zero."""
+    if not p:
+        return p
+    c = p.coeffs()
+    lowest = Lowest(c, [*bounds, *[fmpq(0)] * len(c)])
+    return fmpq_poly(c[: settled(name, number, [lowest])])
 
 
 def _matrix(rows: Any) -> Any:
@@ -155,76 +162,54 @@ def _cofactors(matrix: Any) -> tuple[list[fmpq], list[Any]]:
     return coefficients, found[::-1]
 
 
-def _doubts(a: Any) -> tuple[fmpq, ...]:
-    """Return what rounding of A may make of the lowest coefficients of det(s - A).
+def _bounds(adjugates: Iterable[Any], weights: Any) -> list[fmpq]:
+    """Return what rounding makes of the lowest coefficients of a determinant.
 
-    Of at most two, as long as each is below its bound. The derivative of det(s - A) by
-    an entry of A is a cofactor of s - A.
+    The derivative by an entry is its cofactor.
     """
-    if not len(a):
-        return ()
-    matrix = _matrix(a)
-    return _in_doubt(*_cofactors(matrix), matrix)
-
-
-def doubt(rows: Any, sizes: Any) -> fmpq:
-    """Return what rounding may make of a determinant, or zero if the determinant is larger.
-
-    Sizes are those of the entries, where these are sums.
-    """
-    matrix = _matrix(rows)
-    value = matrix.det()
-    found = _in_doubt([value], [matrix.inv() * value], _matrix(sizes)) if value else ()
-    return found[0] if found else fmpq(0)
-
-
-def _in_doubt(
-    coefficients: Iterable[fmpq], adjugates: Iterable[Any], weights: Any
-) -> tuple[fmpq, ...]:
-    """Return bounds of the lowest coefficients of a determinant, from its cofactors."""
-    found: list[fmpq] = []
-    for c, adjugate in zip(coefficients, adjugates, strict=False):
+    found = []
+    for adjugate in islice(adjugates, _ASKED):
         pairs = zip(weights.entries(), adjugate.transpose().entries(), strict=True)
-        bound = ROUNDED * sum((abs(x * y) for x, y in pairs), fmpq(0))
-        if len(found) == MOST_IN_DOUBT or (c and abs(c) >= bound):
-            break
-        found.append(bound if c else fmpq(0))
-    return tuple(found) if any(found) else ()
+        found.append(ROUNDED * sum((abs(x * y) for x, y in pairs), fmpq(0)))
+    return found
 
 
-def _doubts_of_zeros(a: Any, b: Any, c: Any, d: float, above: Polynomial) -> tuple[fmpq, ...]:
+def _bounds_of_zeros(a: Any, b: Any, c: Any, d: float, value: fmpq_poly) -> list[fmpq]:
     """Return what rounding may make of the lowest coefficients of the numerator.
 
     It is the determinant of [[s - A, B], [-C, D]], whose adjugate is interpolated.
     """
-    if not (len(a) and above):
-        return ()
+    if not value:
+        return []
     n = len(a)
     turned, column, row = [[-x for x in row] for row in a], [x for (x,) in b], c[0]
     matrix = _matrix(bordered(turned, column, [-x for x in row], d))
     size = range(n + 1)
     unit = flint.fmpq_mat(n + 1, n + 1, [int(i == k < n) for i in size for k in size])
-    value = above.exact
     points = [k for k in range(1, 2 * n + 2) if value(k)][: n + 1]
     inverse = flint.fmpq_mat(n + 1, n + 1, [k**i for k in points for i in size]).inv()
     known = [(unit * k + matrix).inv() * value(k) for k in points]
     adjugates = (
-        sum((m * inverse[i, j] for j, m in enumerate(known)), 0 * matrix)
-        for i in range(MOST_IN_DOUBT)
+        sum((m * inverse[i, j] for j, m in enumerate(known)), 0 * matrix) for i in size
     )
-    return _in_doubt(value.coeffs(), adjugates, matrix)
+    return _bounds(adjugates, matrix)
 
 
-def _doubts_of_roots(below: Polynomial) -> tuple[fmpq, ...]:
-    """Return bounds for a denominator that was multiplied out from rounded poles.
+def _bounds_of_product(p: fmpq_poly) -> list[fmpq]:
+    """Return what rounding makes of the lowest coefficients of a polynomial multiplied out.
 
-    Poles are rounded by a share of the largest one, which python-control does to state spaces.
+    Its roots are rounded by a share of the largest one, which python-control does to state
+    spaces. A bound is zero where so many roots are not next to s = 0.
     """
-    largest = exact(max(map(abs, below.roots), default=0.0))
-    for number in range(1, min(MOST_IN_DOUBT, below.degree) + 1):
-        lead = abs(below.exact[number])
-        bounds = [ROUNDED * lead * largest ** (number - k) for k in range(number)]
-        sizes = [abs(below.exact[k]) for k in range(number)]
-        if any(sizes) and all(x < y or not x for x, y in zip(sizes, bounds, strict=True)):
-            return tuple(y if x else fmpq(0) for x, y in zip(sizes, bounds, strict=True))
-    return ()
+    largest = exact(max(map(abs, Polynomial.of(p).roots), default=0.0)) if p else fmpq(0)
+    found = []
+    for first in range(_ASKED):
+        bounds = [fmpq(0)]
+        for number in range(first + 1, min(first + _ASKED, p.degree() + 1)):
+            lead = ROUNDED * abs(p[number])
+            bounds = [lead * largest ** (number - k) for k in range(first, number)]
+            if all(abs(p[k]) < x for k, x in enumerate(bounds, first)):
+                break
+            bounds = [fmpq(0)]
+        found.append(bounds[0])
+    return found

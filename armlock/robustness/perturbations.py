@@ -14,17 +14,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import fmpq
 
-from armlock.affine import Affine, NotAffineError, common
+from armlock.affine import Affine, NotAffineError
 from armlock.checks import FloatArray, finite_series, positive_number, real_number
 from armlock.engine import decide
 from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.decide import BOUNDARY, UNCONFINED, Family
-from armlock.engine.functions import Function
+from armlock.engine.functions import Function, common_zeros
 from armlock.engine.inclusion import EPSILON, TERM, VERTEX
 from armlock.engine.margins import first_zero
 from armlock.engine.polynomials import collected, exact, polynomial, rounded
 from armlock.loops import Loop, checked_loop
-from armlock.stability.counts import CountError, decided, require_certain, unstable_roots
+from armlock.stability.counts import CountError, decided, unstable_roots
 from armlock.systems import Sum, System, delay_object
 
 #: Numbers in the order of the parameters, or by name.
@@ -90,7 +90,6 @@ class _Ray:
         #: The names of the parameters, the start, and the direction in all of them.
         self.start = np.array([real_number(k, v) for k, v in begin.items()])
         self.way = np.array([way.get(name, 0.0) for name in begin])
-        require_certain(system, self.start.tolist())
         #: The t at which the point has moved by |start|, or by one if that is more.
         self.scale = max(1.0, float(np.hypot.reduce(self.start))) / float(
             np.hypot.reduce(self.way)
@@ -128,7 +127,7 @@ class _Ray:
     def count(self, u: float | fmpq) -> int:
         """Count the unstable roots of the closed loop at a point of the ray, exactly given."""
         n, m = self.n + self.dn * u, self.m + self.dm * u
-        return decide.count(n + m, common(n, m))
+        return decide.count(n + m, common_zeros(n, m))
 
     def leaving(self) -> int:
         """Tell where roots of the start at s = 0 go, by the leading terms of f and g.
@@ -361,17 +360,19 @@ def box_count(loop: System, size: float | Mapping[str, float]) -> int:
         size = dict.fromkeys(system.parameters, positive_number("size", size))
     half = {name: positive_number(name, value) for name, value in size.items()}
     at = {name: real_number(name, value) for name, value in system.given((), {}).items()}
-    require_certain(system, list(at.values()))
     affine = Affine.of(system) if set(half) == set(at) else Affine(system, tuple(half))
     half = {name: half[name] for name in affine.free}
-    centre, terms = affine.function(*(at[name] for name in half)), affine.terms[1:]
+    n, m = affine.quotient(*(at[name] for name in half))
+    centre, terms = n + m, affine.terms[1:]
     corners = itertools.product(*((-v, v) for v in half.values()))
     zero = (0.0,) * (1 + len(half))
     family = Family([centre, *terms], [[(VERTEX, (1.0, *corner), zero) for corner in corners]])
     with decided("not decided", np.array(list(at.values()))):
         if not np.isfinite(family.ends(0.0)):
             return UNCONFINED
-        return decide.count(centre) if decide.excludes(family) else BOUNDARY
+        if not decide.excludes(family):
+            return BOUNDARY
+        return decide.count(centre, common_zeros(n, m))
 
 
 def _by_powers(d: Sum, objects: tuple[Delay, Delay]) -> dict[tuple[int, ...], Sum]:

@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armlock.affine import Affine, common
+from armlock.affine import Affine
 from armlock.checks import real_number
+from armlock.engine.functions import common_zeros
 from armlock.engine.margins import require_stable
 from armlock.engine.varying import constant_radius_of, varying_radius_of
 from armlock.loops import Loop, checked_loop
-from armlock.stability.counts import decided, require_certain
+from armlock.stability.counts import decided
 
 
 class VaryingRadius(NamedTuple):
@@ -111,11 +112,10 @@ def varying_radius(loop: Loop, *values: float, **numbers: float) -> VaryingRadiu
     """
     given = checked_loop(loop, _PLACE).given(values, numbers)
     affine, point = Affine.of(loop), [real_number(k, v) for k, v in given.items()]
-    require_certain(loop, point)
     n, m = affine.quotient(*point)
     d, changes = n + m, affine.terms[1:]
     with decided("no radius", np.array(point)):
-        require_stable(d, common(n, m))
+        require_stable(d, common_zeros(n, m))
         radius, omega, scalings = varying_radius_of(d, changes)
         constant = constant_radius_of(d, changes, radius) if radius else 0.0
     return VaryingRadius(

@@ -21,7 +21,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 from armlock.affine import Affine, NotAffineError
 from armlock.checks import BoolArray, FloatArray, IntArray, axis, check_memory, real_number
 from armlock.engine import chain
-from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
+from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import exact, rounded
@@ -177,10 +177,6 @@ def stability_chart(
         counts = _chart(affine, ys[order_y], xs[order_x]).T
     else:
         counts = _chart(affine, xs[order_x], ys[order_y])
-    for other in system.others:
-        # A pole that may be meant to be zero changes the count.
-        chart = stability_chart(other, **{name1: xs, name2: ys}, **numbers)
-        counts[chart.counts[np.ix_(order_y, order_x)] != counts] = UNDECIDED
     if (np.diff(order_x) != 1).any() or (np.diff(order_y) != 1).any():
         counts = counts[np.ix_(np.argsort(order_y), np.argsort(order_x))]
     return StabilityChart(system, xs, ys, counts, (name1, name2))

@@ -8,14 +8,14 @@ behaviour at s = 0 is known.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from armlock.affine import Affine, NotAffineError, common, present, quotient_at
+from armlock.affine import Affine, NotAffineError, present, quotient_at
 from armlock.checks import (
     BoolArray,
     FloatArray,
@@ -28,7 +28,7 @@ from armlock.checks import (
 from armlock.engine import decide
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
-from armlock.engine.functions import Function, check_sizes, stacked
+from armlock.engine.functions import Function, check_sizes, common_zeros, stacked
 from armlock.engine.inclusion import EPSILON, Functions
 from armlock.systems import System
 
@@ -87,7 +87,7 @@ def _count_exactly(n: Function, m: Function, right_of: float = 0.0) -> int:
     """Count the roots of N + M = 0, of a loop those of the closed loop."""
     function = n + m
     # No root cancels where D has none at s = 0.
-    cancelled = 0 if function.series(1)[0] else common(n, m)
+    cancelled = 0 if function.series(1)[0] else common_zeros(n, m)
     if abs(right_of) * function.space.longest > _LARGEST_EXPONENT:
         raise ValueError(
             f"right_of must be at most {_LARGEST_EXPONENT:.0f} over the longest delay in "
@@ -190,8 +190,7 @@ def unstable_roots(
         If a number is not finite and real, a parameter is missing or unknown, or the values do
         not broadcast or fit into memory.
     CountError
-        If the count at a single point takes too many steps, or a count depends on a pole that
-        may be meant to be zero, see `Controller.of`. Nothing is guessed.
+        If the count at a single point takes too many steps. Nothing is guessed.
 
     Notes
     -----
@@ -227,37 +226,9 @@ def unstable_roots(
     """
     right_of = real_number("right_of", right_of)
     system, points, shape = at_points(system, values, numbers)
-    counts = _counts(system, points, right_of)
-    for other in system.others:
-        differ = _counts(other, points, right_of) != counts
-        if differ.any():
-            raise in_doubt(points[differ])
-    return counts.reshape(shape) if shape else int(counts[0])
-
-
-def in_doubt(points: FloatArray) -> CountError:
-    """Return the error of a count that depends on a pole or zero next to s = 0."""
-    return CountError(
-        "no count: it depends on whether a pole or a zero of a state space is at s = 0, which "
-        "rounding of its matrices does not decide; in place of the state space write "
-        "Controller.of(state_space, integrators=1), or 2, or 0 if no pole is meant to be zero, "
-        "and zeros=1, or 2, or 0, for its zeros; with delays write "
-        "armlock.state_space(..., integrators=1), or 0, and zeros=1, or 0",
-        points,
-    )
-
-
-def require_certain(system: System, point: Sequence[Any]) -> None:
-    """Raise a `CountError` where what rounding hides at s = 0 changes the count."""
-    if system.others:
-        unstable_roots(system, *point)
-
-
-def _counts(system: System, points: FloatArray, right_of: float) -> IntArray:
-    """Count at points, shape (n, k)."""
     if len(points) > 1 and right_of == 0.0:
         with suppress(NotAffineError):
-            return count_points(*_over(system, points))
+            return count_points(*_over(system, points)).reshape(shape)
     found = np.empty(len(points), np.int64)
     for i, point in enumerate(points):
         try:
@@ -266,7 +237,7 @@ def _counts(system: System, points: FloatArray, right_of: float) -> IntArray:
             if len(points) == 1:
                 raise CountError(f"no count{place(point)}: {error}", points) from None
             found[i] = UNDECIDED
-    return found
+    return found.reshape(shape) if shape else int(found[0])
 
 
 def _over(system: System, points: FloatArray) -> tuple[Affine, FloatArray]:

@@ -25,7 +25,7 @@ from armlock.engine.functions import (
 )
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import rounded
-from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided, in_doubt, place
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided, place
 from armlock.stability.crossings import crossings
 from armlock.systems import System
 
@@ -228,9 +228,6 @@ def nyquist(
     (1, 0, 1)
     """
     n, m, point = open_quotient(loop, values, numbers)
-    if System.of(loop).others:
-        # A pole that may be zero is on the right for some of its values.
-        raise in_doubt(point[None])
     poles = open_loop_poles(m)
     order, radius = _leading_radius(n, m)
     with decided("no Nyquist count", point):

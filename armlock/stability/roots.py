@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from armlock.affine import common, quotient_at
+from armlock.affine import quotient_at
+from armlock.engine.functions import common_zeros
 from armlock.engine.roots import rightmost_zero
-from armlock.stability.counts import at_points, require_certain
+from armlock.stability.counts import at_points
 from armlock.systems import System
 
 
@@ -39,8 +40,6 @@ def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayL
     ------
     TypeError, ValueError
         As `unstable_roots`, or if D has no root at all there because it is constant.
-    CountError
-        If a pole that may be meant to be zero changes the count, see `unstable_roots`.
     RootError
         If no root can be certified within a few seconds; its `estimate` is the best candidate,
         nan if there is none.
@@ -77,7 +76,6 @@ def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayL
     system, points, shape = at_points(system, values, numbers)
     found = []
     for point in points.tolist():
-        require_certain(system, point)
         n, m = quotient_at(system, point)
-        found.append(rightmost_zero(n + m, common(n, m)))
+        found.append(rightmost_zero(n + m, common_zeros(n, m)))
     return np.array(found, np.complex128).reshape(shape) if shape else found[0]

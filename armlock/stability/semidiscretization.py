@@ -29,7 +29,6 @@ from armlock.checks import (
 from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.polynomials import collected, exact, polynomial
 from armlock.engine.roots import RootError
-from armlock.engine.statespace import with_others
 from armlock.stability.counts import at_points
 from armlock.systems import Sum, System
 
@@ -44,9 +43,8 @@ _SHARE, _LEAST = 2.0**-54, 1e-300
 def _continuous(system: Any) -> System:
     """Return a system that is no map and whose roots are all those of D, or raise."""
     found = System.of(system)
-    if found.step or found.known:
-        what = f"a map with step {found.step}" if found.step else "a distributed delay"
-        raise ValueError(f"system must be in continuous time, with delays alone, got {what}")
+    if found.step:
+        raise ValueError(f"system must be in continuous time, got a map with step {found.step}")
     return found
 
 
@@ -98,7 +96,7 @@ def _realized(
     # A delay whose parameter is zero keeps its place.
     whole = System.of(system)
     parts = dict.fromkeys(whole.numerator.lags | whole.denominator.lags, fmpq_poly([0]))
-    parts |= _at_point(system, values, numbers).rounded().before()
+    parts |= _at_point(system, values, numbers).before()
     parts = dict(sorted(parts.items(), key=lambda part: part[0].time))
     undelayed = parts.pop(NOW, fmpq_poly([0]))
     _retarded(parts, undelayed.degree())
@@ -411,12 +409,9 @@ def semi_discretization(
     array([0, 5])
     """
     step, system = _checked(step, order), _continuous(system)
-    system = system.at(**numbers)
-    return with_others(lambda one: _map_of(one, step, order), system)
-
-
-def _map_of(system: System, step: float, order: int) -> System:
-    """Return the equation of the map of a system."""
+    system, at_zero = system.at(**numbers), system.at_zero
+    if (at_zero or 0) > 1:
+        raise ValueError(f"at_zero must be 0 or 1: a map keeps one root there, got {at_zero}")
     d = (system.numerator + system.denominator).terms
     for lag, names in d:
         if names and not lag:
@@ -443,7 +438,7 @@ def _map_of(system: System, step: float, order: int) -> System:
         for k, value in enumerate(p.coeffs()):
             lag = Lag.of({q: size - k + back})
             found = found + Sum.of(fmpq_poly([sign * value]), lag, *names)
-    return System(found, Sum({}), system.nominal, step)
+    return System(found, Sum({}), system.nominal, step, at_zero)
 
 
 def _with_root_at_one(maps: list[fmpq_poly], at_rest: list[fmpq]) -> list[fmpq_poly]:
