@@ -216,7 +216,7 @@ def _rounding(name: str, number: int | None, d: Sum) -> Sum:
     """Return the lowest coefficients of a determinant that are meant to be zero."""
     if not d:
         return d
-    series = d.lowest(whole_number(name, number or 0, 0) + 2)
+    series = d.lowest(whole_number(name, 0 if number is None else number, 0) + 2)
     stated = settled(name, number, series)
     return Sum.of(polynomial(series[0].coefficients[:stated]))
 

@@ -682,7 +682,8 @@ class System:
         """Return the limit at s = 0; inf at a pole."""
         number = _TERMS + max(self.numerator.degree, self.denominator.degree)
         n, m = (part.series(number) for part in (self.numerator, self.denominator))
-        above, below = next((pair for pair in zip(n, m, strict=True) if any(pair)), (0, 1))
+        zero = fmpq(0), fmpq(1)
+        above, below = next((pair for pair in zip(n, m, strict=True) if any(pair)), zero)
         return complex(rounded([above / below])[0] if below else np.inf)
 
     def __eq__(self, other: object) -> bool:
@@ -1004,6 +1005,6 @@ def equation_of(
     """
     if not d:
         raise ValueError("an equation must not be zero everywhere")
-    series = d.lowest(whole_number("at_zero", at_zero or 0, 0) + 1)
+    series = d.lowest(whole_number("at_zero", 0 if at_zero is None else at_zero, 0) + 1)
     stated = settled("at_zero", at_zero, series, cleared=cleared)
     return System(d.without(stated), Sum({}), nominal, step, stated)

@@ -60,7 +60,7 @@ def settled(
     cleared : int, optional
         How many roots at s = 0 come from clearing denominators.
     """
-    stated = whole_number(name, number or 0, 0)
+    stated = whole_number(name, 0 if number is None else number, 0)
     size = len(series[0].coefficients)
     sure = [any(one.is_sure(k) for one in series) for k in range(size)]
     zero = [not any(one.coefficients[k] for one in series) for k in range(size)]
