@@ -104,7 +104,8 @@ def test_what_has_a_delay_or_is_zero_is_no_controller():
     with pytest.raises(ValueError, match=r"^controller must hold no delay"):
         Controller.of(k * delay(1.0))
     with pytest.raises(ValueError, match=r"^controller must not be zero"):
-        k - System.of(k)
+        Controller.of(k - k)
+    assert (k - k)(1.0) == (k - System.of(k))(1.0) == 0.0
     with pytest.raises(TypeError, match=r"^system must be a System, a number"):
         k * "x"
 

@@ -288,7 +288,7 @@ def test_the_table_of_pasted_texts_is_long():
 @pytest.mark.parametrize("typed", [*DOUBTFUL, *CERTAIN], ids=itertools.count())
 def test_what_rounded_digits_leave_open_is_said(text, typed):
     found = text.evaluate(READ, ["readController", typed])
-    assert ("Half a unit" in found["doubt"]) == (typed in DOUBTFUL)
+    assert ("half a unit" in found["doubt"]) == (typed in DOUBTFUL)
 
 
 def test_no_print_of_an_integrator_asks_for_more_digits(text):
@@ -711,7 +711,7 @@ def test_a_printed_controller_is_understood_or_refused(opened):
         )
         assert tab.get_by_label("Dead time in s").input_value() == "3"
     paste(page, DOUBTFUL[0])
-    assert "Half a unit" in page.locator(".live-fields").inner_text()
+    assert "half a unit" in page.locator(".live-fields").inner_text()
     paste(page, "(s^3 + 1)/(s^2 + 0.1 s)")
     assert "3 zeros and 2 poles" in page.locator("[role=alert]").text_content()
 

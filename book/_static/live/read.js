@@ -328,6 +328,11 @@ const armlockRead = (function () {
     return { coefficients, adjugate };
   }
 
+  /* What rounding makes of a coefficient that is meant to be zero, as a share of its terms: the package
+   * refuses such a system until it is stated what is meant. */
+  const ROUNDED = 2 ** -44;
+  const hide = (value, off) => { if (!isNil(value) && sizeOf(value) < off) value.off = Math.max(value.off, off); };
+
   /* A state space of one input and output, exactly: numerator and denominator are determinants. */
   function ofStates(a, b, c, d, refuse) {
     const n = a.length, column = b.flat(), row = c.flat(), [[direct]] = d;
@@ -340,29 +345,30 @@ const armlockRead = (function () {
     // The matrix is scaled: s^k has scale^(k - n) of the determinant, and one power more of the adjugate.
     const power = k => k < n ? [1n, scale ** (level - BigInt(k))] : [scale ** BigInt(k - n), 1n];
     const [bs, cs] = [column.map(whole), row.map(whole)], wholes = a.map(one => one.map(whole));
-    // How much what was rounded moves a coefficient: by the adjugates of A and of A - B C.
-    const rounded = [...a.flat(), ...column, ...row].some(v => v.off);
-    const closed = rounded && characteristic(wholes.map((one, i) => one.map((v, k) => v * scale - bs[i] * cs[k])));
-    const off = a.map(one => one.map(v => v.off)), entries = weights => off.reduce((sum, one, i) =>
-      sum + one.reduce((part, v, k) => part + (v ? v * Math.abs(weights(k, i)) : 0), 0), 0);
+    // How much a coefficient moves if entries may be off: by the adjugates of A and of A - B C.
+    const closed = characteristic(wholes.map((one, i) => one.map((v, k) => v * scale - bs[i] * cs[k])));
+    const [bd, cd] = [column, row].map(all => all.map(v => double(v.re))), feed = double(direct.re) - 1;
+    const along = (all, weight) => all.reduce((sum, v, i) => sum + (v && v * Math.abs(weight(i))), 0);
+    const moves = (read, value, at, other) => {
+      const entries = weight => a.reduce((sum, one, i) => sum + along(one.map(read), k => weight(k, i)), 0);
+      return [entries(at), read(direct) * Math.abs(double(value.re)) + entries((i, j) => feed * at(i, j) + other(i, j))
+        + along(row.map(read), i => bd.reduce((sum, w, j) => sum + w * at(i, j), 0))
+        + along(column.map(read), j => cd.reduce((sum, w, i) => sum + w * at(i, j), 0))];
+    };
     const below = [], above = [];
     for (let k = 0; k <= n; k++) {
       const inner = k < n ? first.adjugate[k] : null;
       const at = inner ? (i, j) => double(productOf([inner[i][j], 1n], power(k + 1))) : () => 0;
-      const value = number(productOf([first.coefficients[k], 1n], power(k)), NIL, rounded ? entries(at) : 0);
+      const value = number(productOf([first.coefficients[k], 1n], power(k)));
       let sum = times(direct, value);
       if (inner) {
         const through = cs.reduce((all, v, i) => all + v * inner[i].reduce((part, w, j) => part + w * bs[j], 0n), 0n);
         sum = plus(sum, number(productOf(fraction(through, scale * scale), power(k + 1))));
-        if (rounded) {
-          const [bd, cd] = [column, row].map(all => all.map(v => double(v.re))), feed = double(direct.re) - 1;
-          // That of A - B C was found of scale^2 (A - B C).
-          const other = (i, j) => double(productOf([closed.adjugate[k][i][j], 1n],
-            [1n, scale ** (2n * (level - 1n - BigInt(k)))]));
-          sum.off = direct.off * Math.abs(double(value.re)) + entries((i, j) => feed * at(i, j) + other(i, j))
-            + row.reduce((all, v, i) => all + v.off * Math.abs(bd.reduce((part, w, j) => part + w * at(i, j), 0)), 0)
-            + column.reduce((all, v, j) => all + v.off * Math.abs(cd.reduce((part, w, i) => part + w * at(i, j), 0)), 0);
-        }
+        // That of A - B C was found of scale^2 (A - B C).
+        const other = (i, j) => double(productOf([closed.adjugate[k][i][j], 1n],
+          [1n, scale ** (2n * (level - 1n - BigInt(k)))]));
+        [value.off, sum.off] = moves(v => v.off, value, at, other);
+        if (k === 0) moves(v => ROUNDED * Math.abs(double(v.re)), value, at, other).forEach((off, i) => hide([value, sum][i], off));
       }
       below.push(value);
       above.push(sum);
@@ -888,7 +894,14 @@ const armlockRead = (function () {
 
     polynomial(value, word) {
       if (value.k && !isScalar(value)) return value;
-      return ofPolynomial(this.vector(value, word).reverse());
+      const p = trimmed(this.vector(value, word).reverse());
+      // A root of polynomials that were multiplied out is rounded by a share of the largest one.
+      const largest = p.length > 2 ? Math.max(...rootsExactly(p).map(root => Math.hypot(...root))) : 0;
+      for (const number of [1, 2]) {
+        const bounds = Array.from({ length: number }, (_, k) => p.length > number && ROUNDED * sizeOf(p[number]) * largest ** (number - k));
+        if (bounds.every((bound, k) => p[k] && sizeOf(p[k]) < bound)) bounds.forEach((bound, k) => hide(p[k], bound));
+      }
+      return ofPolynomial(p);
     }
 
     quotient(above, below, word) {
@@ -1045,8 +1058,8 @@ const armlockRead = (function () {
     const [zeros, poles] = [found.zeros, found.poles].map(all => realFactors(all, none));
     const loose = [[zeros, "a zero"], [poles, "a pole"]].filter(([all]) => all.some(mayCross)).map(([, name]) => name);
     return { zeros: zeros.flatMap(rootsExactly), poles: poles.flatMap(rootsExactly), gain: double(found.k.re), delay: double(delay),
-      doubt: loose.length ? `Half a unit of the last printed digit moves ${loose.join(" and ")} across the imaginary axis or `
-        + "off s = 0. Paste more digits." : "" };
+      doubt: loose.length ? `Rounding, or half a unit of the last printed digit, moves ${loose.join(" and ")} across the imaginary `
+        + "axis or off s = 0. Paste more digits, or zeros and poles." : "" };
   }
 
   /* The numbers of a list as MATLAB or Python print it, as pairs of doubles: [..], array(..), columns, a
