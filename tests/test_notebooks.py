@@ -19,24 +19,6 @@ NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
 LONGEST = 25
 
 
-#: Chapters that are not rewritten yet, and the tests that they do not pass.
-NOT_YET = {
-    "11_robust_controller": "alone",
-    "14_tdi": "behind bare",
-    "18_errata": "behind",
-}
-
-
-def chapters(what=""):
-    """Return the notebooks as parameters, those that do not pass a test yet as such."""
-    mark = pytest.mark.xfail(strict=True, raises=AssertionError, reason="not rewritten yet")
-    late = {stem for stem, tests in NOT_YET.items() if what in tests.split()}
-    return [
-        pytest.param(path, id=path.stem, marks=[mark] if path.stem in late else [])
-        for path in NOTEBOOKS
-    ]
-
-
 class Cell:
     """A code cell: its source, its label, and how the page shows it."""
 
@@ -170,22 +152,22 @@ def test_what_two_cells_bind_is_found():
     assert not twice([code("ratio = 1"), code("ratio = 2")])
 
 
-@pytest.mark.parametrize("notebook", chapters("open"))
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_what_is_open_needs_the_imports_only(notebook):
     assert not missing([cell for cell in code_cells(notebook) if cell.open])
 
 
-@pytest.mark.parametrize("notebook", chapters())
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_what_is_shown_needs_nothing_that_is_not(notebook):
     assert not missing([cell for cell in code_cells(notebook) if cell.shown])
 
 
-@pytest.mark.parametrize("notebook", chapters("alone"))
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_what_is_glued_or_filed_is_bound_by_one_cell(notebook):
     assert not twice(code_cells(notebook))
 
 
-@pytest.mark.parametrize("notebook", chapters("behind"))
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_the_file_stands_behind_the_course(notebook):
     cells = code_cells(notebook)
     assert all(cell.filed for cell in cells if cell.decides)
@@ -195,14 +177,14 @@ def test_the_file_stands_behind_the_course(notebook):
         assert (cell.filed and cell.folded) or check or not cell.shown, cell.label
 
 
-@pytest.mark.parametrize("notebook", chapters("short"))
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_open_cells_are_short(notebook):
     for cell in code_cells(notebook):
         lines = len(cell.source.splitlines())
         assert not cell.open or cell.imports or lines <= LONGEST, cell.source
 
 
-@pytest.mark.parametrize("notebook", chapters("bare"))
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_imports_hold_imports_the_style_and_empty_dictionaries(notebook):
     for cell in code_cells(notebook):
         for one in ast.parse(cell.source).body if cell.imports else []:
@@ -211,7 +193,7 @@ def test_imports_hold_imports_the_style_and_empty_dictionaries(notebook):
             assert bare or isinstance(one, ast.Import | ast.ImportFrom), line
 
 
-@pytest.mark.parametrize("notebook", chapters())
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_bookkeeping_is_one_statement_a_cell(notebook):
     for cell in code_cells(notebook):
         assert cell.shown or len(ast.parse(cell.source).body) == 1, cell.source
@@ -222,7 +204,7 @@ BOOKKEEPING = {"figures", "diagrams", "plt", "np", "Ledger", "ledger"} | set(dir
 METHODS = {"min", "max", "values", "items", "subplots"}
 
 
-@pytest.mark.parametrize("notebook", chapters())
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_bookkeeping_computes_nothing(notebook):
     for cell in code_cells(notebook):
         for call in ast.walk(ast.parse(cell.source)):
@@ -232,7 +214,7 @@ def test_bookkeeping_computes_nothing(notebook):
                 assert name in BOOKKEEPING or method in METHODS, ast.unparse(call)
 
 
-@pytest.mark.parametrize("notebook", chapters())
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_folded_cells_say_what_they_hold(notebook):
     for cell in code_cells(notebook):
         if cell.folded:

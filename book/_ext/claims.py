@@ -52,6 +52,7 @@ def details(claim):
         f"What decides: {claim.text('criterion')}." if claim.criterion else "",
         f"{sentence(claim.text('quantity'))}: **{claim.number}** ({decided}).",
         claim.text("note"),
+        f"Major: {claim.changes}." if claim.changes else "",
     ]
     return "\n\n".join(part for part in parts if part)
 
@@ -67,12 +68,13 @@ def table(ledger, claims, *, target=False):
             others = "".join(f' <span id="ledger-{o}">{o}</span>' for o in claim.also)
             row = (
                 f'<tr id="ledger-{name}" data-verdict="{claim.verdict.name.lower()}" '
-                f'data-weight="{claim.weight}" '
+                f'data-weight="{claim.weight}" data-major="{bool(claim.changes):d}" '
                 f'data-section="{html.escape(ledger.section(claim))}">'
             )
         rows.append(
             f"{row}<td>\n\n{link(name)}{others}\n\n</td><td>\n\n{badge(claim.verdict)}\n\n</td>"
-            f"<td>{claim.weight}</td><td><details><summary>\n\n{claim.says}\n\n</summary>\n\n"
+            f"<td>{claim.weight}{', major' if claim.changes else ''}</td>"
+            f"<td><details><summary>\n\n{claim.says}\n\n</summary>\n\n"
             f"{details(claim)}\n\n</details></td></tr>\n\n"
         )
     heads = ("Claim", "Verdict", "About", "What the source says")
@@ -103,6 +105,8 @@ def controls(ledger, claims):
         f"{boxes('weight', Weight, lambda _, text: text)}</fieldset>"
         '<label>Section <select name="section"><option value="">all</option>'
         f"{options}</select></label>"
+        f'<label><input type="checkbox" name="major" value="1"> major only '
+        f"({sum(bool(claim.changes) for claim in claims)})</label>"
         '<label>Search <input type="search" name="words" autocomplete="off"></label>'
         '<button type="reset">Show all</button>'
         f'<p><output role="status">{len(claims)} of {len(claims)} claims</output></p></form>'
@@ -139,6 +143,18 @@ class Claims(LedgerDirective):
         claims = [claim for claim in ledger if claim.chapter == chapter]
         names = ", ".join(link(claim.name) for claim in claims)
         return f"Claims decided here: {names}.\n\n{table(ledger, claims)}"
+
+
+class Major(LedgerDirective):
+    """The claims whose verdict changes what the paper says of itself."""
+
+    def write(self, ledger):
+        """Return a line a claim."""
+        return "".join(
+            f"- {link(claim.name)} {badge(claim.verdict)} {sentence(claim.changes)}.\n"
+            for claim in ledger
+            if claim.changes
+        )
 
 
 class Whole(LedgerDirective):
@@ -196,6 +212,7 @@ class Errata(LedgerDirective):
             affected = (one for one in ledger if set(one.names) & set(claim.affects))
             parts = {
                 "Printed" if claim.printed else "In our words": claim.printed or claim.says,
+                "What decides": claim.text("criterion"),
                 "What follows": f"{sentence(claim.text('quantity'))}: **{claim.number}**. "
                 f"{claim.text('note')}",
                 "What depends on it": ", ".join(
@@ -272,6 +289,7 @@ def setup(app):
     """Register with Sphinx."""
     app.add_directive("claims", Claims)
     app.add_directive("ledger", Whole)
+    app.add_directive("major", Major)
     app.add_directive("tally", Tally)
     app.add_directive("errata", Errata)
     app.add_directive("assumptions", Assumptions)

@@ -13,6 +13,7 @@
       const hit = data.getAll('verdict').includes(row.dataset.verdict)
         && data.getAll('weight').includes(row.dataset.weight)
         && (!section || row.dataset.section === section)
+        && (!data.has('major') || row.dataset.major === '1')
         && words.every(word => texts[i].includes(word));
       row.hidden = !hit;
       count += hit;

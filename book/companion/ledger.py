@@ -225,6 +225,9 @@ class Claim(Numbers):
         Further places of the same claim, by the identifier of each.
     affects : sequence of str
         Claims whose verdict or number uses what this one corrects.
+    changes : str
+        Of a major claim, the sentence of abstract, contributions or conclusion that its verdict
+        changes, and how.
     """
 
     place: str
@@ -242,6 +245,7 @@ class Claim(Numbers):
     note: str = ""
     also: Mapping[str, str] = field(default_factory=dict)
     affects: tuple[str, ...] = ()
+    changes: str = ""
 
     def __post_init__(self) -> None:
         """Make sure that the verdict follows from the readings.
@@ -372,6 +376,7 @@ class Ledger:
                 "printed": claim.printed,
                 "chapter": claim.chapter,
                 "weight": str(claim.weight),
+                "changes": claim.changes,
                 "verdict": str(claim.verdict),
                 "clause": claim.verdict.clause,
                 "readings": "; ".join(claim.tried),
