@@ -16,11 +16,11 @@ Point = tuple[float, float]
 dsp: Any = blocks
 
 
-def _draw(ax: Axes, parts: list[Any]) -> None:
+def _draw(ax: Axes, parts: list[Any], fontsize: float = 11) -> None:
     """Draw elements in axes, whose units are theirs."""
     ax.set_axis_off()
     ax.set_aspect("equal")
-    drawing: Any = schemdraw.Drawing(canvas=ax, show=False, unit=1.0, fontsize=11, lw=1.3)
+    drawing: Any = schemdraw.Drawing(canvas=ax, show=False, unit=1.0, fontsize=fontsize, lw=1.3)
     for part in parts:
         drawing.add(part)
     drawing.draw(show=False)
@@ -74,33 +74,34 @@ def plot_modules(ax: Axes) -> None:
     light: dict[str, Any] = {"color": ORANGE}
     digital: dict[str, Any] = {"color": BLUE, "style": "--"}
     parts = [
-        _box((3.0, 2.2), 6.6, 6.2, "").color("#999999").zorder(0),
-        _box((11.6, 2.2), 4.6, 6.2, "").color("#999999").zorder(0),
-        _box((1.6, 4.0), 2.2, 1.1, "laser"),
-        _box((4.6, 4.0), 2.2, 1.1, "optical\nbench"),
-        _box((4.6, 0.6), 2.2, 1.1, "phase-\nmeter"),
-        _box((1.6, 0.6), 2.2, 1.1, "arm-locking\ncontroller"),
-        _box((11.6, 4.0), 3.2, 1.1, "optical bench"),
-        _box((11.6, 0.6), 3.2, 1.1, "laser, phase-\nlocked loop"),
-        _box((8.0, -2.6), 5.4, 1.1, "telescope pointing, clocks, ..."),
-        *_path((2.7, 4.0), (3.5, 4.0), **light),
-        *_path((5.7, 4.25), (10.0, 4.25), **light),
-        *_path((10.0, 3.75), (5.7, 3.75), **light),
-        *_path((4.6, 3.45), (4.6, 1.15), **light),
-        *_path((12.2, 3.45), (12.2, 1.15), **light),
-        *_path((11.0, 1.15), (11.0, 3.45), **light),
-        *_path((3.5, 0.6), (2.7, 0.6), **digital),
-        *_path((1.6, 1.15), (1.6, 3.45), **digital),
-        *_path((6.8, -2.05), (5.3, 0.05), style=":"),
-        *_path((9.2, -2.05), (10.6, 0.05), style=":"),
+        _box((3.7, 6.0), 7.2, 4.6, "").color("#999999").zorder(0),
+        _box((3.7, -0.4), 7.2, 1.9, "").color("#999999").zorder(0),
+        _box((1.8, 7.4), 2.6, 1.2, "arm-locking\ncontroller"),
+        _box((5.6, 7.4), 2.6, 1.2, "phase-\nmeter"),
+        _box((1.8, 4.6), 2.6, 1.2, "laser"),
+        _box((5.6, 4.6), 2.6, 1.2, "optical\nbench"),
+        _box((1.8, -0.4), 2.6, 1.2, "laser, phase-\nlocked loop"),
+        _box((5.6, -0.4), 2.6, 1.2, "optical\nbench"),
+        _box((3.7, -3.2), 5.4, 1.1, "telescope pointing, clocks, ..."),
+        *_path((3.1, 4.6), (4.3, 4.6), **light),
+        *_path((5.6, 5.2), (5.6, 6.8), **light),
+        *_path((5.3, 4.0), (5.3, 0.2), **light),
+        *_path((5.9, 0.2), (5.9, 4.0), **light),
+        *_path((4.3, -0.15), (3.1, -0.15), **light),
+        *_path((3.1, -0.65), (4.3, -0.65), **light),
+        *_path((4.3, 7.4), (3.1, 7.4), **digital),
+        *_path((1.8, 6.8), (1.8, 5.2), **digital),
+        *_path((1.8, -2.65), (1.8, -1.0), style=":"),
+        *_path((6.4, -3.2), (9.0, -3.2), (9.0, 7.4), (6.9, 7.4), style=":"),
     ]
     _draw(ax, parts)
-    for x, text in ((3.0, "local spacecraft"), (11.6, "remote spacecraft")):
-        ax.text(x, 5.5, text, ha="center", va="bottom", fontsize=11)
-    ax.text(7.85, 4.45, r"out: $\varphi(t)$", ha="center", va="bottom", fontsize=11)
-    back = r"back: $c\,\varphi(t-\tau) + n$"
-    ax.text(7.8, 3.5, back, ha="center", va="top", fontsize=10)
-    ax.set(xlim=(-0.5, 14.1), ylim=(-3.3, 6.3))
+    for y, text in ((8.4, "local spacecraft"), (-1.45, "remote spacecraft")):
+        side = "bottom" if y > 0 else "top"
+        ax.text(3.9, y, text, ha="center", va=side, fontsize=11)
+    ax.text(5.1, 2.1, r"out: $\varphi(t)$", ha="right", va="center", fontsize=11)
+    back = "back:\n" + r"$c\,\varphi(t-\tau) + n$"
+    ax.text(6.1, 2.1, back, ha="left", va="center", fontsize=11)
+    ax.set(xlim=(-0.1, 9.3), ylim=(-3.9, 9.1))
 
 
 def plot_loop(ax: Axes) -> None:
@@ -151,12 +152,12 @@ def plot_loop(ax: Axes) -> None:
         _box((1.6, middle), 1.8, 1.0, "$K(s)$"),
         *_path((0.7, middle), (0.45, middle), (0.45, 1.1)),
     ]
-    _draw(ax, parts)
+    _draw(ax, parts, fontsize=13)
     for y in (upper, lower):
-        ax.text(8.15, y - 0.75, "−", ha="left", va="center", fontsize=11)
-    ax.text(-1.8, 1.75, r"laser, $\varphi_0$", ha="left", va="bottom", fontsize=10)
-    ax.text(14.4, 1.75, r"$\varphi$", ha="right", va="bottom", fontsize=11)
-    ax.text(0.2, 0.75, "−", ha="right", va="center", fontsize=11)
+        ax.text(8.15, y - 0.75, "−", ha="left", va="center", fontsize=13)
+    ax.text(-1.8, 2.15, r"laser, $\varphi_0$", ha="left", va="bottom", fontsize=13)
+    ax.text(14.4, 1.75, r"$\varphi$", ha="right", va="bottom", fontsize=13)
+    ax.text(0.2, 0.75, "−", ha="right", va="center", fontsize=13)
     ax.set(xlim=(-1.9, 14.7), ylim=(-5.6, 2.6))
 
 
@@ -191,7 +192,7 @@ def plot_constellation(ax: Axes) -> None:
     for far, number in zip(remote, ("2", "1"), strict=True):
         along = far / np.hypot(*far)
         aside = 0.14 * np.array([-along[1], along[0]])
-        near, end = 0.6 * along, far - 0.6 * along
+        near, end = 0.45 * along, far - 0.45 * along
         for start, stop in ((near + aside, end + aside), (end - aside, near - aside)):
             arrow = {"arrowstyle": "-|>", "color": ORANGE, "shrinkA": 0.0, "shrinkB": 0.0}
             ax.annotate("", stop, start, arrowprops=arrow)
@@ -204,7 +205,7 @@ def plot_constellation(ax: Axes) -> None:
     arrow = {"arrowstyle": "-|>", "color": BLUE, "linestyle": "--", "shrinkA": 0.0}
     for start, end in (((0.35, -0.35), (2.6, -1.7)), ((-2.6, -1.7), (-0.35, -0.35))):
         ax.annotate("", end, start, arrowprops=arrow)
-    ax.annotate("", (-1.35, -2.3), (1.35, -2.3), arrowprops=arrow)
+    ax.annotate("", (-1.55, -2.3), (1.45, -2.3), arrowprops=arrow)
     box = {"boxstyle": "round,pad=0.3", "facecolor": "white", "edgecolor": BLUE}
     ax.text(2.7, -2.3, "compare with\nreturned light", ha="center", va="center", bbox=box)
     ax.text(-2.7, -2.3, "controller\nsteers laser", ha="center", va="center", bbox=box)
@@ -232,7 +233,7 @@ def plot_growth(axes: Any) -> None:
     arrow = {"arrowstyle": "-|>", "color": ORANGE, "shrinkA": 0.0, "shrinkB": 0.0}
 
     def arm(ax: Axes, start: float, end: float, words: str) -> None:
-        gap = 0.35 if end > start else -0.35
+        gap = 0.28 if end > start else -0.28
         ax.annotate("", (end - gap, 0.12), (start + gap, 0.12), arrowprops=arrow)
         ax.annotate("", (start + gap, -0.12), (end - gap, -0.12), arrowprops=arrow)
         ax.text((start + end) / 2, 0.3, words, ha="center", va="bottom", color=ORANGE)
