@@ -41,6 +41,7 @@ from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
 from armlock.systems import Sum, System, equation, parameter
 from armlock.systems import delay as pure_delay
 from armlock.systems import s as laplace
+from armlock.tables import Table, as_html, number
 
 
 def HayesEquation(tau: float = 1.0) -> System:
@@ -183,6 +184,19 @@ class Loop(System):
                 f"the loop is not well posed: 1 + K (m1 + m2) must not vanish at high "
                 f"frequency, got {highest}"
             )
+
+    def _table(self) -> Table:
+        """Show the arguments, and no coefficients."""
+        k = self.controller
+        factors = f"{len(k.zeros)} zeros and {len(k.poles)} poles, gain {number(k.gain)}"
+        rows = [("controller", factors), ("sensor", self.mapping.name)]
+        rows += [(name, number(getattr(self, name), "s")) for name in ("tau1", "tau2", "delay")]
+        return Table("Arm-locking loop with parameters c1 and c2", rows)
+
+    _repr_html_ = as_html
+
+    # Multiplied out, a loop is no text that one reads.
+    _repr_latex_ = None  # type: ignore[assignment]
 
     def __getstate__(self) -> dict[str, Any]:  # type: ignore[override]
         """Return the arguments and the delay objects."""

@@ -33,6 +33,7 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
+from armlock.tables import Shown, Table, number
 
 #: Speed of light in m/s.
 SPEED_OF_LIGHT = 299_792_458.0
@@ -79,8 +80,8 @@ _ESA = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Constellation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Constellation(Shown):
     """Three spacecraft, 1 to 3, in orbit around the Sun.
 
     Attributes
@@ -99,6 +100,16 @@ class Constellation:
     span: tuple[float, float]
     error: float
     _paths: tuple[_Path, ...]
+
+    def _table(self) -> Table:
+        """Show the epoch, the span and the error."""
+        first, last = (number(t / 86400.0) for t in self.span)
+        rows = [
+            ("t = 0", self.epoch),
+            ("round trips", f"from day {first} to day {last}"),
+            ("error of a light time", f"at most {number(self.error, 's')}"),
+        ]
+        return Table("Constellation of three spacecraft", rows)
 
     def round_trips(self, t: npt.ArrayLike, master: int = 1) -> tuple[FloatArray, FloatArray]:
         """Return the delays of the two round trips that start and end at the master.

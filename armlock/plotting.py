@@ -15,12 +15,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch
 from matplotlib.projections.polar import PolarAxes
 from scipy import ndimage
 
 from armlock.checks import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
+    from armlock.engine.margins import Margins
     from armlock.stability.charts import StabilityChart
     from armlock.stability.dcurve import Branch, Line
     from armlock.stability.nyquist import NyquistCurve
@@ -53,6 +55,7 @@ def plot_chart(
     counts: bool = True,
     largest: int = 12,
     labels: bool = False,
+    legend: bool | None = None,
     **style: Any,
 ) -> Axes:
     """Colour a chart by its number of unstable roots, the stable region apart.
@@ -69,6 +72,8 @@ def plot_chart(
         Counts above this share one colour.
     labels : bool, optional
         Write the count into each region that has room for it.
+    legend : bool, optional
+        Say what the colours are; by default where no counts are written.
     **style
         As `matplotlib.axes.Axes.pcolorfast` takes it, for instance `cmap`.
 
@@ -99,6 +104,12 @@ def plot_chart(
     label_parameters(ax, chart.parameters)
     if labels:
         _label_regions(ax, chart)
+    if not labels if legend is None else legend:
+        tops = {"stable": STABLE, "1": unstable[0], f"{largest} or more": unstable[-1]}
+        patches = [Patch(facecolor=color, label=name) for name, color in tops.items()]
+        patches = patches if counts else patches[:1]
+        title = "unstable roots" if counts else None
+        ax.legend(handles=patches, title=title, fontsize=8, title_fontsize=8)
     return ax
 
 
@@ -174,6 +185,7 @@ def plot_nyquist(
     ax: Axes | None = None,
     *,
     arrows: Iterable[float] = (),
+    margins: Margins | None = None,
     **style: Any,
 ) -> Axes:
     """Draw a Nyquist curve, both signs of omega, with -1 and the infinite branch.
@@ -183,13 +195,15 @@ def plot_nyquist(
     curve : NyquistCurve
         From `nyquist` with `omega_max`, so that its samples are close.
     ax : Axes, optional
-        Where to draw. By default, the current axes of matplotlib, or new axes that show the
-        neighbourhood of -1. Plain axes do not show the infinite branch. Polar axes show the
+        Where to draw; matplotlib's current axes by default. Plain axes without data show the
+        neighbourhood of -1, and never the infinite branch. Polar axes show the
         whole curve: the angle is that of L, and the distance from the origin is linear up to
         0.01 and logarithmic beyond, up to a circle that stands for infinity.
     arrows : iterable of float, optional
         Frequencies in rad/s at which an arrow points in the direction of rising omega; past
         the end of the curve it stands there.
+    margins : Margins, optional
+        Of the same loop: marked where they are taken, with the unit circle.
     **style
         As `matplotlib.axes.Axes.plot` takes it.
 
@@ -205,11 +219,10 @@ def plot_nyquist(
     >>> ax.get_xlabel()
     'real part of $L$'
     """
-    if ax is None:
-        ax = plt.gca()
-        if not ax.has_data():
-            ax.set(xlim=(-3.0, 3.0), ylim=(-3.0, 3.0), aspect="equal")
+    ax = plt.gca() if ax is None else ax
     compressed = isinstance(ax, PolarAxes)
+    if not compressed and not ax.has_data() and ax.get_autoscale_on():
+        ax.set(xlim=(-3.0, 3.0), ylim=(-3.0, 3.0))
     forward, omega = curve.response, curve.omega
     if compressed and curve.indentation.size:
         # On to the infinite branch, in the direction in which the curve leaves for it.
@@ -221,6 +234,8 @@ def plot_nyquist(
     for frequency in arrows:
         index = min(int(np.searchsorted(omega, frequency)), omega.size - 2)
         _arrow(ax, forward[index : index + 2], BLUE)
+    if margins is not None:
+        _mark(ax, curve, margins)
     minus_one = _coordinates(ax, np.array([-1.0 + 0.0j]))
     ax.plot(*minus_one, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)
     if isinstance(ax, PolarAxes):
@@ -252,6 +267,22 @@ def _arrow(ax: Axes, values: ComplexArray, color: str) -> None:
     start, stop = np.transpose(_coordinates(ax, values))
     arrow = {"arrowstyle": "-|>", "color": color, "mutation_scale": 13, "shrinkB": 0}
     ax.annotate("", stop, start, arrowprops=arrow)
+
+
+def _mark(ax: Axes, curve: NyquistCurve, margins: Margins) -> None:
+    """Mark where a loop's margins are taken."""
+    circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 400))
+    ax.plot(*_coordinates(ax, circle), color="0.6", linewidth=0.8, linestyle=":")
+    marks = {
+        f"gain {margins.gain_upper:.3g}": (margins.gain_omega, "o"),
+        f"phase {margins.phase_degrees:.3g}°": (margins.phase_omega, "s"),
+        f"modulus {margins.modulus:.3g}": (margins.modulus_omega, "^"),
+    }
+    for label, (omega, marker) in marks.items():
+        if curve.omega[0] <= omega <= curve.omega[-1]:
+            there = np.array([np.interp(omega, curve.omega, curve.response)])
+            ax.plot(*_coordinates(ax, there), marker, color=ORANGE, label=label)
+    ax.legend(fontsize=8)
 
 
 def _infinite_branch(ax: Axes, curve: NyquistCurve) -> None:

@@ -12,6 +12,7 @@ LAYERS = [
     "checks",
     "paper",
     "compiled",
+    "tables",
     "engine",
     "controllers",
     "systems",

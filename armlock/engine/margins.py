@@ -22,6 +22,7 @@ from armlock.engine.decide import Family, least
 from armlock.engine.functions import Function, common_zeros, keeps_sign_up_to, stacked
 from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL, TERM, VERTEX
 from armlock.engine.polynomials import Polynomial, exact, on_axis, rounded
+from armlock.tables import Shown, Table, at, decibels, number
 
 # Gain factors up to which is searched, the next one where doubles do not decide the last one;
 # and most steps of a proof that no gain is too large.
@@ -69,8 +70,8 @@ def _unequal(number: int) -> list[list[tuple[int, tuple[float, ...], tuple[float
     ]
 
 
-@dataclass(frozen=True)
-class Margins:
+@dataclass(frozen=True, repr=False)
+class Margins(Shown):
     r"""Distances of a stable loop from instability.
 
     Gain and phase are taken where L is real and negative, and where its magnitude is one:
@@ -113,6 +114,8 @@ class Margins:
     >>> found = margins(paper_loop())
     >>> print(f"stable for gains from {found.gain_lower:.3f} to {found.gain_upper:.2f}")
     stable for gains from 0.195 to 6.61
+    >>> print(f"{found.gain_upper_db:.1f} dB, {found.phase_degrees:.1f} degrees")
+    16.4 dB, 36.0 degrees
 
     As a Series of pandas: ``pd.Series(vars(found))``.
     """
@@ -128,21 +131,35 @@ class Margins:
     gain_lower_is_bound: bool = False
     gain_upper_is_bound: bool = False
 
-    def __repr__(self) -> str:
-        """List the margins with their units."""
-        units = dict.fromkeys(vars(self), "")
-        units |= {name: " rad/s" for name in units if name.endswith("_omega")}
-        units |= {"phase": " rad", "delay": " s"}
-        signs = {
-            "gain_lower": "<=" if self.gain_lower_is_bound else "=",
-            "gain_upper": ">=" if self.gain_upper_is_bound else "=",
-        }
-        shown = (
-            f"{name}{signs.get(name, '=')}{value}{units[name]}"
-            for name, value in vars(self).items()
-            if not name.endswith("_is_bound")
-        )
-        return f"Margins({', '.join(shown)})"
+    @property
+    def phase_degrees(self) -> float:
+        """The phase margin in degrees."""
+        return math.degrees(self.phase)
+
+    @property
+    def gain_lower_db(self) -> float:
+        """The lower gain margin in dB; -inf where the loop is stable down to a gain of 0."""
+        return float(decibels(self.gain_lower))
+
+    @property
+    def gain_upper_db(self) -> float:
+        """The upper gain margin in dB."""
+        return float(decibels(self.gain_upper))
+
+    def _table(self) -> Table:
+        """Show each margin in both of its units, and where it is taken."""
+        least = "at most " if self.gain_lower_is_bound else ""
+        most = "at least " if self.gain_upper_is_bound else ""
+        gain = f"{least}{number(self.gain_lower)} to {most}{number(self.gain_upper)}"
+        db = f"{self.gain_lower_db:.4g} to {self.gain_upper_db:.4g} dB"
+        degrees = f"{self.phase_degrees:.4g} degrees"
+        rows = [
+            ("gain", gain, db, at(self.gain_omega)),
+            ("phase", number(self.phase, "rad"), degrees, at(self.phase_omega)),
+            ("delay", number(self.delay, "s")),
+            ("modulus", number(self.modulus), "", at(self.modulus_omega)),
+        ]
+        return Table("Margins", rows)
 
 
 def at_zero(f: Function, g: Function) -> float:

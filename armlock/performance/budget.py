@@ -17,6 +17,7 @@ import numpy.typing as npt
 from armlock.checks import FloatArray, axis, finite_series, not_negative, positive_array
 from armlock.loops import Loop
 from armlock.performance.transfer import require_stable, responses
+from armlock.tables import Shown, Table, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,8 +82,8 @@ LASERS: dict[str, Callable[[FloatArray], FloatArray]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class NoiseBudget:
+@dataclass(frozen=True, eq=False, repr=False)
+class NoiseBudget(Shown):
     """Amplitude spectral densities at the locked laser, one-sided, in Hz/sqrt(Hz).
 
     Attributes
@@ -108,6 +109,15 @@ class NoiseBudget:
     requirement: FloatArray
     free: FloatArray
 
+    def _table(self) -> Table:
+        """Show all sources at the first, the middle and the last frequency."""
+        chosen = sorted({0, self.frequency.size // 2, self.frequency.size - 1})
+        series = {"free laser": self.free} | self.sources
+        series |= {"total": self.total, "required": self.requirement}
+        rows = [("frequency", *(number(self.frequency[k], "Hz") for k in chosen))]
+        rows += [(name, *(f"{v[k]:.4g}" for k in chosen)) for name, v in series.items()]
+        return Table("Noise of the locked laser in Hz/sqrt(Hz)", rows)
+
     @property
     def total(self) -> FloatArray:
         """All sources together, which are independent."""
@@ -118,13 +128,15 @@ class NoiseBudget:
         """The requirement divided by the total."""
         return self.requirement / self.total
 
-    def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
+    def plot(self, ax: Axes | None = None, *, legend: bool = True, **style: Any) -> Axes:
         """Draw the sources, the total and the requirement over frequency.
 
         Parameters
         ----------
         ax : matplotlib Axes, optional
             Where to draw; the current ones by default.
+        legend : bool, optional
+            Name the lines.
         **style
             Style of the sources, as for `matplotlib.axes.Axes.loglog`.
 
@@ -144,6 +156,8 @@ class NoiseBudget:
         ax.loglog(
             self.frequency, self.requirement, color="black", dashes=(6, 2), label="required"
         )
+        if legend:
+            ax.legend(fontsize=8)
         ax.set(xlabel="frequency [Hz]", ylabel=r"frequency noise [Hz/$\sqrt{\mathrm{Hz}}$]")
         return ax
 

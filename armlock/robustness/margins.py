@@ -28,6 +28,7 @@ from armlock.engine.margins import (
 from armlock.loops import checked_loop
 from armlock.stability.counts import decided
 from armlock.systems import Sum, System, delay_object
+from armlock.tables import Table, as_html, as_text, at, decibels, number
 
 _T = TypeVar("_T")
 
@@ -111,6 +112,13 @@ class PeakGain(NamedTuple):
 
     gain: float
     omega: float
+
+    def _table(self) -> Table:
+        """Show the gain as a factor and in dB, and where it is."""
+        gain = number(self.gain), f"{decibels(self.gain):.4g} dB"
+        return Table("Peak gain", [(*gain, at(self.omega))])
+
+    __repr__, _repr_html_ = as_text, as_html  # type: ignore[misc]
 
 
 def peak_gain(system: Any) -> PeakGain:

@@ -26,6 +26,7 @@ from armlock.engine.polynomials import collected, exact, polynomial, rounded
 from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import CountError, decided, unstable_roots
 from armlock.systems import Sum, System, delay_object
+from armlock.tables import Table, as_html, as_text, at, number
 
 #: Numbers in the order of the parameters, or by name.
 Point = Sequence[float] | FloatArray | Mapping[str, float]
@@ -54,6 +55,12 @@ class Crossing(NamedTuple):
 
     position: float
     omega: float
+
+    def _table(self) -> Table:
+        """Show the t of the crossing, and its frequency."""
+        return Table("First crossing", [(f"t = {number(self.position)}", at(self.omega))])
+
+    __repr__, _repr_html_ = as_text, as_html  # type: ignore[misc]
 
 
 def _named(system: System, name: str, given: Any) -> dict[str, float]:

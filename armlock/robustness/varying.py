@@ -13,6 +13,7 @@ from armlock.engine.margins import require_stable
 from armlock.engine.varying import constant_radius_of, varying_radius_of
 from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import decided
+from armlock.tables import Table, as_html, as_text, at, number
 
 
 class VaryingRadius(NamedTuple):
@@ -37,6 +38,16 @@ class VaryingRadius(NamedTuple):
     constant: float
     omega: float
     scalings: tuple[float, ...]
+
+    def _table(self) -> Table:
+        """Show both radii, and where the first is taken."""
+        rows = [
+            ("factors that vary", number(self.radius), at(self.omega)),
+            ("constant factors", number(self.constant)),
+        ]
+        return Table("How far the factors of the arms may be from their values", rows)
+
+    __repr__, _repr_html_ = as_text, as_html  # type: ignore[misc]
 
 
 _PLACE = (

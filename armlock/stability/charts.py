@@ -21,13 +21,14 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 from armlock.affine import Affine, NotAffineError
 from armlock.checks import BoolArray, FloatArray, IntArray, axis, check_memory, real_number
 from armlock.engine import chain
-from armlock.engine.decide import BOUNDARY, UNCONFINED
+from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
 from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import exact, rounded
 from armlock.stability.counts import count_points, unstable_roots
 from armlock.stability.crossings import crossings
 from armlock.systems import System
+from armlock.tables import Shown, Table, spread
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,8 +50,8 @@ _FEW, _ROWS, _MANY_CROSSINGS, _MANY_POINTS, _BATCH = 1024, 8, 2_000_000, 1_000_0
 _PATIENCE = 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class StabilityChart:
+@dataclass(frozen=True, eq=False, repr=False)
+class StabilityChart(Shown):
     """Number of unstable roots over a grid of the two free parameters.
 
     Attributes
@@ -80,6 +81,23 @@ class StabilityChart:
     y: FloatArray
     counts: IntArray
     parameters: tuple[str, str]
+
+    def _table(self) -> Table:
+        """Show the axes, and the shares of what was counted."""
+        axes = zip(self.parameters, (self.x, self.y), strict=True)
+        rows = [(name, spread(values)) for name, values in axes]
+        kinds = {
+            "stable": self.stable,
+            "unstable": self.counts > 0,
+            "root on the axis (-1)": self.counts == BOUNDARY,
+            "chain not confined (-2)": self.counts == UNCONFINED,
+            "undecided (-3)": self.counts == UNDECIDED,
+        }
+        share = "{} points, {:.3g} %"
+        for what, is_so in kinds.items():
+            if is_so.any():
+                rows.append((what, share.format(is_so.sum(), 100.0 * is_so.mean())))
+        return Table("Stability chart", rows)
 
     @property
     def stable(self) -> BoolArray:

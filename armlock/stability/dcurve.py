@@ -23,6 +23,7 @@ from armlock.engine.polynomials import collected, polynomial, rounded
 from armlock.stability.counts import CountError
 from armlock.stability.crossings import crossings
 from armlock.systems import Sum, System
+from armlock.tables import Table, as_html, as_text, number, spread
 
 _S = fmpq_poly([0, 1])
 #: Polynomials by the length of their delay, which may be negative.
@@ -35,6 +36,13 @@ class Line(NamedTuple):
     weight_x: float
     weight_y: float
     value: float
+
+    def _table(self) -> Table:
+        """Show the line as an equation."""
+        left = f"{number(self.weight_x)} x + {number(self.weight_y)} y"
+        return Table("Line of omega = 0", [(f"{left} = {number(self.value)}",)])
+
+    __repr__, _repr_html_ = as_text, as_html  # type: ignore[misc]
 
 
 class Branch(NamedTuple):
@@ -51,6 +59,14 @@ class Branch(NamedTuple):
     omega: FloatArray
     x: FloatArray
     y: FloatArray
+
+    def _table(self) -> Table:
+        """Show how long the branch is."""
+        names = ("omega", "rad/s"), ("x", ""), ("y", "")
+        rows = [(name, spread(getattr(self, name), unit)) for name, unit in names]
+        return Table("Branch of a D-curve", rows)
+
+    __repr__, _repr_html_ = as_text, as_html  # type: ignore[misc]
 
 
 def _two(system: Any, numbers: dict[str, Any]) -> tuple[System, str, str]:
@@ -236,7 +252,7 @@ def d_curve_line(system: System, **numbers: float) -> Line:
     >>> from armlock import CommonArm
     >>> from armlock.stability.dcurve import d_curve_line
     >>> d_curve_line(CommonArm())
-    Line(weight_x=1.0, weight_y=1.0, value=2.0)
+    Line of omega = 0: 1 x + 1 y = 2
     """
     system, x, y = _two(system, numbers)
     value, first, second = (f.series(1)[0] for f in Affine(system, (x, y)).terms)

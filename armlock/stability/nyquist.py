@@ -28,6 +28,8 @@ from armlock.engine.polynomials import rounded
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided, place
 from armlock.stability.crossings import crossings
 from armlock.systems import System
+from armlock.tables import Shown, Table, number, spread
+from armlock.tables import at as where
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,12 +39,14 @@ if TYPE_CHECKING:
 _SMALL, _LARGE = 1e-3, 1e12
 # To this share L has to agree at both ends of the interval that holds a crossing.
 _AGREED = 1e-3
+# Crossings that a table shows.
+_SHOWN = 10
 # The share of a leading term that all others are at most, where a picture begins.
 _NEGLIGIBLE = 5e-4
 
 
-@dataclass(frozen=True, eq=False)
-class NyquistCurve:
+@dataclass(frozen=True, eq=False, repr=False)
+class NyquistCurve(Shown):
     """The open loop along the indented Nyquist contour, for omega >= 0.
 
     Attributes
@@ -82,6 +86,17 @@ class NyquistCurve:
     open_loop_poles: int
     closed_loop_roots: int
 
+    def _table(self) -> Table:
+        """Show the numbers of the theorem first."""
+        rows = [
+            ("unstable roots of the closed loop", str(self.closed_loop_roots)),
+            ("clockwise turns around -1", str(self.encirclements)),
+            ("unstable poles of L", str(self.open_loop_poles)),
+            ("order of the pole of L at s = 0", str(self.pole_order)),
+            ("frequencies", spread(self.omega, "rad/s")),
+        ]
+        return Table("Nyquist curve", rows)
+
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Draw the curve, both signs of omega, with -1 and the infinite branch.
 
@@ -101,8 +116,8 @@ class NyquistCurve:
         return plot_nyquist(self, ax, **options)
 
 
-@dataclass(frozen=True, eq=False)
-class AxisCrossings:
+@dataclass(frozen=True, eq=False, repr=False)
+class AxisCrossings(Shown):
     """Where the Nyquist curve meets the negative real axis.
 
     Attributes
@@ -122,6 +137,12 @@ class AxisCrossings:
 
     omega: FloatArray
     value: FloatArray
+
+    def _table(self) -> Table:
+        """Show the first crossings, and how many there are."""
+        both = list(zip(self.omega.tolist(), self.value.tolist(), strict=True))
+        rows = [(f"L = {number(value)}", where(omega)) for omega, value in both[:_SHOWN]]
+        return Table(f"{len(both)} crossings of the negative real axis", rows)
 
 
 def open_loop_poles(m: Function) -> int:

@@ -23,6 +23,7 @@ from armlock.checks import (
 )
 from armlock.compiled import njit
 from armlock.controllers import Controller
+from armlock.tables import Shown, Table, number
 from armlock.timedomain.discretize import (
     Rows,
     readout,
@@ -38,7 +39,7 @@ _BLOCK = 1 << 20
 _LASER_ZEROS, _LASER_POLE = (2.37, 7.87), 6.03
 
 
-class ShapedNoise:
+class ShapedNoise(Shown):
     r"""White noise through a rational filter: the sampled form of one in continuous time.
 
     With zeros :math:`z_i`, poles :math:`p_i` and gain :math:`g` the prescribed density is
@@ -119,6 +120,16 @@ class ShapedNoise:
             order = self._sampled.order
             start = self._root @ self._random.standard_normal(order)
             self._state[:order] = self._scale * start
+
+    def _table(self) -> Table:
+        """Show rate, standard deviation and density."""
+        hertz = 0.1 * self.sample_rate
+        rows = [
+            ("sample rate", number(self.sample_rate, "Hz")),
+            ("r.m.s.", number(self.rms)),
+            (f"density at {number(hertz, 'Hz')}", f"{self.asd(hertz):.4g} per sqrt(Hz)"),
+        ]
+        return Table(type(self).__name__, rows)
 
     def asd(self, frequency: npt.ArrayLike) -> FloatArray:
         """Prescribed density at a frequency in Hz, in the series' unit per sqrt(Hz).

@@ -29,6 +29,7 @@ from armlock.checks import (
 )
 from armlock.compiled import njit
 from armlock.loops import Loop, checked_loop
+from armlock.tables import Shown, Table, number
 from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_loop, warped
 from armlock.timedomain.interpolation import Weights, lagrange_weights, reach
 
@@ -238,7 +239,7 @@ def sampled_open_loop(
     return np.asarray(loop.controller(s) * (m1 * (1.0 - c1 * back1) + m2 * (1.0 - c2 * back2)))
 
 
-class Simulation:
+class Simulation(Shown):
     r"""A simulation of a loop, block by block, that keeps its state between blocks.
 
     Controller, sensor and arms start at rest.
@@ -326,6 +327,13 @@ class Simulation:
         states = len(self._sensor.states) + 2 * len(self._controller.sections)
         self._work = np.zeros(_STATES + states)
         self._past = np.empty(0)
+
+    def _table(self) -> Table:
+        """Show the rate, and how far the run is."""
+        rate = number(self.sample_rate, "Hz")
+        end = number(self.samples / self.sample_rate, "s")
+        rows = [("sample rate", rate), ("computed", f"{self.samples} samples, {end}")]
+        return Table("Simulation", rows)
 
     def advance(
         self, noise: npt.ArrayLike, *, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,10 @@ from armlock.checks import (
     real_array,
     real_number,
 )
+from armlock.tables import Shown, Table, number, spread
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: Samples in a segment, and from one segment to the next.
 SEGMENT = 1024
@@ -50,8 +55,8 @@ _WINDOW = np.kaiser(SEGMENT + 1, 20.0)[:-1]
 _FINE = 8
 
 
-@dataclass(frozen=True, eq=False)
-class Spectrum:
+@dataclass(frozen=True, eq=False, repr=False)
+class Spectrum(Shown):
     r"""An estimate of a one-sided amplitude spectral density.
 
     Its square integrates to the variance,
@@ -91,6 +96,37 @@ class Spectrum:
     averages: FloatArray
     resolution: FloatArray
     bins: IntArray
+
+    def _table(self) -> Table:
+        """Show the bands, and how exact the estimates are."""
+        error = 0.5 / np.sqrt(self.averages)
+        rows = [
+            ("bands", spread(self.frequency, "Hz")),
+            ("density", spread(self.asd, "of the series' unit per sqrt(Hz)")),
+            ("relative standard deviation", spread(error)),
+        ]
+        return Table("Amplitude spectral density", rows)
+
+    def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
+        """Draw the density over frequency, with logarithmic axes.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current ones by default.
+        **style
+            As for `matplotlib.axes.Axes.loglog`, for instance `label`.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        import matplotlib.pyplot as plt
+
+        ax = plt.gca() if ax is None else ax
+        ax.loglog(self.frequency, self.asd, **style)
+        ax.set(xlabel="frequency [Hz]", ylabel=r"density [$1/\sqrt{\mathrm{Hz}}$]")
+        return ax
 
     def expected(self, asd: Callable[[FloatArray], npt.ArrayLike]) -> FloatArray:
         r"""Return what the estimator gives on average for a known density.
@@ -237,7 +273,7 @@ class _Rate:
         ]
 
 
-class SpectrumEstimator:
+class SpectrumEstimator(Shown):
     r"""Estimates a density from samples as they come in.
 
     Memory grows with the logarithm of the duration only, and the estimate does not depend on
@@ -279,6 +315,10 @@ class SpectrumEstimator:
     def __init__(self, sample_rate: float) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self._rates = [_Rate(self.sample_rate, 0)]
+
+    def _table(self) -> Table:
+        """Show the rate."""
+        return Table("Spectrum estimator", [(number(self.sample_rate, "Hz"),)])
 
     def add(self, series: npt.ArrayLike) -> None:
         """Take in the next samples.
