@@ -147,6 +147,21 @@ def test_the_data_of_a_chart_are_its_counts_at_its_points(chart):
         assert np.isnan(shown) if count < 0 else shown == count
 
 
+def test_a_long_curve_keeps_its_nulls_and_peaks(ax):
+    x = np.linspace(0.0, 1.0, 50_001)
+    null, peak = np.full((2, x.size), 2.0)
+    null[12_345], peak[23_456], peak[:9] = 1e-3, 7.0, np.nan
+    ax.plot(x, null, label="null")
+    ax.plot(x, peak, label="peak")
+    table = figures.drawn(ax.figure)
+    assert list(table) == ["null, x", "null, y", "peak, y"]
+    places, null, peak = table.values()
+    assert 250 <= places.size <= 1002
+    assert (places[0], places[-1]) == (0.0, 1.0)
+    assert places[null.argmin()] == x[12_345]
+    assert places[np.nanargmax(peak)] == x[23_456]
+
+
 def test_a_drawing_has_no_data(ax):
     ax.plot([0.0, 1.0], [0.0, 1.0])
     ax.set_axis_off()

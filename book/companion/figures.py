@@ -6,7 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Iterator, Mapping
-from itertools import zip_longest
+from itertools import groupby, zip_longest
 from string import ascii_lowercase
 from typing import SupportsFloat
 
@@ -27,6 +27,27 @@ _PATH, _DIGITS = re.compile(rb' d="[^"]*"'), re.compile(rb"(\.\d\d)\d+")
 def _plain(label: str) -> str:
     """Return an axis label without the marks of its typesetting."""
     return re.sub(r"[$\\{}]|mathrm", "", label)
+
+
+def _kept(curves: list[npt.NDArray[np.float64]]) -> npt.NDArray[np.intp]:
+    """Return which points of curves over the same places a table holds.
+
+    Longer curves are cut into stretches, and of each stretch the lowest and the highest point
+    of each curve are kept: a null or a peak may be one point wide.
+    """
+    size = curves[0].size
+    if size <= _MOST_POINTS:
+        return np.arange(size)
+    ends = [0, size - 1]
+    for stretch in np.array_split(np.arange(size), _MOST_POINTS // (2 * len(curves))):
+        for y in curves:
+            there = y[stretch]
+            ends += [
+                stretch[np.where(np.isnan(there), sign * np.inf, sign * there).argmin()]
+                for sign in (1.0, -1.0)
+                if not np.isnan(there).all()
+            ]
+    return np.unique(ends)
 
 
 def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
@@ -57,14 +78,14 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
         below = [other.get_xlabel() for other in ax.get_shared_x_axes().get_siblings(ax)]
         across = _plain(ax.get_xlabel() or max(below)) or "x"
         up = _plain(ax.get_ylabel()) or "y"
-        shared = np.empty(0)
+        curves: list[tuple[str, npt.NDArray[np.float64], npt.NDArray[np.float64]]] = []
         for number, artist in enumerate([*ax.lines, *ax.collections], 1):
             if artist.get_transform() != ax.transData:
                 continue
             label = str(artist.get_label())
             # Matplotlib's own labels begin with an underscore.
             name = panel + ("" if label.startswith("_") else _plain(label))
-            if name == panel or f"{name}, {up}" in columns:
+            if name == panel or any(name == other for other, *_ in curves):
                 name = f"{name}{number}"
             if isinstance(artist, Line2D):
                 x, y = np.array(artist.get_data(orig=False), dtype=np.float64)
@@ -73,13 +94,14 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
                 x, y = np.concatenate(outline).T
             else:
                 continue
-            if x.size < 2:
-                continue
-            every = slice(None, None, -(-x.size // _MOST_POINTS))
-            if not np.array_equal(x, shared):
-                columns[f"{name}, {across}"] = x[every]
-            columns[f"{name}, {up}"] = y[every]
-            shared = x
+            if x.size > 1:
+                curves.append((name, x, y))
+        # Curves that follow each other over the same places share a column for them.
+        for _, same in groupby(curves, key=lambda curve: curve[1].tobytes()):
+            name, x, _ = (group := list(same))[0]
+            kept = _kept([y for *_, y in group])
+            columns[f"{name}, {across}"] = x[kept]
+            columns |= {f"{name}, {up}": y[kept] for name, _, y in group}
         for image in ax.images:
             values: npt.NDArray[np.float64] = np.ma.filled(
                 np.ma.asarray(image.get_array()), np.nan
