@@ -42,7 +42,6 @@ from armlock import controllers as controllers
 from armlock import paper as paper
 from armlock import sensors as sensors
 from armlock.controllers import Controller
-from armlock.engine.roots import RootError
 from armlock.loops import (
     CommonArm,
     DualArm,
@@ -79,7 +78,7 @@ from armlock.stability.counts import (
 )
 from armlock.stability.dcurve import d_curve, d_curve_branches, d_curve_line
 from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
-from armlock.stability.roots import rightmost_root
+from armlock.stability.roots import RootError, rightmost_root
 from armlock.stability.semidiscretization import (
     semi_discretization,
     spectral_radius,

@@ -1,6 +1,7 @@
 import contextlib
 import pickle
 import time
+from fractions import Fraction
 from typing import Any
 
 import control
@@ -25,6 +26,7 @@ from armlock import (
     paper_loop,
     parameter,
     rightmost_root,
+    s,
     unstable_roots,
 )
 from armlock.loops import flight_loop
@@ -160,6 +162,25 @@ def test_a_neutral_loop_whose_roots_tend_to_the_limit_of_the_chain_is_refused_so
     named = float(str(error.value).split("Re s = ")[1].split(",")[0])
     assert named == pytest.approx(limit, rel=1e-5)
     assert error.value.estimate.real < limit
+
+
+def test_roots_ever_further_right_are_refused_at_once():
+    """The undelayed term of the highest power is zero, but rounding leaves 1e-17 of it."""
+    third, eleventh = (Fraction(1, n) * delay(t) for n, t in ((3, 0.1), (11, 0.3)))
+    advanced = equation(s + 1 + s**2 * (third + eleventh))
+    begun = time.process_time()
+    with pytest.raises(RootError, match="what is undelayed at the highest power"):
+        rightmost_root(advanced)
+    assert time.process_time() - begun < 5.0
+
+
+@pytest.mark.parametrize("h", [1.0, 2.0, 0.135177512, 0.13517751289353663])
+def test_cubes_of_an_average_have_the_root_of_their_unit_of_time(h):
+    """These were no numbers, or more of them than fit into the memory."""
+    average = (1 - delay(h)) / (s * h)
+    unit = (1 - delay(1.0)) / s
+    scaled = h * rightmost_root(0.1 * average**3)
+    assert scaled == pytest.approx(rightmost_root(0.1 * unit**3), rel=1e-9)
 
 
 def test_a_map_without_memory_has_no_root():

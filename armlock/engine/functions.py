@@ -10,13 +10,12 @@ of the imaginary axis: a frequency past which one term exceeds all others.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import factorial
 from typing import Any, NamedTuple
 
-import mpmath
 import numpy as np
 import numpy.typing as npt
 from flint import fmpq
@@ -25,7 +24,7 @@ from armlock.checks import BoolArray, ComplexArray, FloatArray
 from armlock.engine import chain, inclusion
 from armlock.engine.chain import Lag
 from armlock.engine.inclusion import EPSILON, Arrays
-from armlock.engine.polynomials import Polynomial, exact, in_mpmath, order, rounded
+from armlock.engine.polynomials import Polynomial, exact, order, rounded
 
 Exact = npt.NDArray[np.object_]
 # Most coefficients of a series at s = 0 of which one has to differ from zero.
@@ -323,7 +322,7 @@ class Function:
         for p, s, row in zip(self.space.polynomials, self.steady, self.delayed, strict=True):
             acting = [(w, t) for w, t in zip(row, self.space.delays, strict=True) if w]
             e = [s] + [
-                sum((w * (-t) ** i for w, t in acting), fmpq(0)) / factorial(i)
+                sum((w * (-t) ** i for w, t in acting), fmpq(0)) / math.factorial(i)
                 for i in range(1, number)
             ]
             for i, a in enumerate(p.exact.coeffs()[:number]):
@@ -381,21 +380,6 @@ class Function:
             g = steady[j] + turn @ delayed[j]
             value += p * g
             slope += dp * g - p * ((1.0 + turn) @ (delays * delayed[j]))
-        return value, slope
-
-    def exact_value_and_slope(self, s: Any) -> tuple[Any, Any]:
-        """F and its derivative at an mpmath number, in mpmath's precision."""
-        value, slope = mpmath.mpf(0), mpmath.mpf(0)
-        for p, steady, row in zip(
-            self.space.polynomials, self.steady, self.delayed, strict=True
-        ):
-            q, dq = p.evaluated(s)
-            g, dg = in_mpmath(steady), mpmath.mpf(0)
-            for weight, theta in zip(row, self.space.delays, strict=True):
-                if weight:
-                    w, t = in_mpmath(weight), in_mpmath(theta)
-                    g, dg = g + w * mpmath.expm1(-s * t), dg - w * t * mpmath.exp(-s * t)
-            value, slope = value + q * g, slope + dq * g + q * dg
         return value, slope
 
     def shifted(self, sigma: float) -> tuple[Space, inclusion.Functions]:
@@ -459,7 +443,7 @@ def limit_at_zero(n: Function, m: Function) -> float:
 
 def log(value: fmpq) -> float:
     """Natural logarithm of a positive fraction, of which a float may overflow."""
-    return float(mpmath.log(int(value.p)) - mpmath.log(int(value.q)))
+    return math.log(int(value.p)) - math.log(int(value.q))
 
 
 def check_sizes(steady: FloatArray, delayed: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -11,7 +11,6 @@ from operator import mul
 from typing import Any, TypeVar
 
 import flint
-import mpmath
 import numpy as np
 from flint import fmpq, fmpq_poly
 
@@ -137,19 +136,6 @@ class Polynomial:
         """Evaluate p(s) / q(s), factor by factor."""
         return quotients(self.roots, other.roots, float(self.lead / other.lead), s)
 
-    def evaluated(self, s: Any) -> tuple[Any, Any]:
-        """Value and derivative at an mpmath number, in mpmath's precision."""
-        value, slope = in_mpmath(self.lead), mpmath.mpf(0)
-        for k, root in enumerate(self.roots):
-            if k not in self.computed:
-                value, slope = value * (s - root), slope * (s - root) + value
-        for factor in self.factors:
-            p, dp = mpmath.mpf(0), mpmath.mpf(0)
-            for c in reversed(factor):
-                p, dp = p * s + in_mpmath(c), dp * s + p
-            value, slope = value * p, slope * p + value * dp
-        return value, slope
-
 
 @np.errstate(under="ignore")
 def quotients(
@@ -173,11 +159,6 @@ def quotients(
 def exact(value: Any) -> fmpq:
     """Return a number as a fraction of python-flint; a float is the binary number it is."""
     return value if isinstance(value, fmpq) else fmpq(*value.as_integer_ratio())
-
-
-def in_mpmath(value: fmpq) -> Any:
-    """Return a fraction in mpmath's precision."""
-    return mpmath.mpf(int(value.p)) / int(value.q)
 
 
 def polynomial(coefficients: fmpq_poly | Iterable[Any]) -> fmpq_poly:

@@ -1,20 +1,559 @@
-"""The characteristic root with the largest real part, of loops, maps and systems with delays.
+"""Characteristic roots: all right of a line, and the rightmost one, found and certified.
 
-It is found and certified by `armlock.engine.roots`.
+Candidates come from Newton's method in double precision, from points of lines Re s = sigma.
+Each is enclosed in a disc that holds a known number of roots (Lemma 25). The count for
+D(s + sigma) says how many roots there are right of a line, so that none is missing.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import itertools
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import flint
 import numpy as np
 import numpy.typing as npt
+from flint import acb, acb_poly, arb, fmpq, fmpq_poly
 
 from armlock.affine import quotient_at
-from armlock.engine.functions import common_zeros
-from armlock.engine.roots import rightmost_zero
+from armlock.checks import ComplexArray, FloatArray
+from armlock.engine import chain, decide, inclusion
+from armlock.engine.chain import UndecidedError
+from armlock.engine.decide import BOUNDARY, UNCONFINED
+from armlock.engine.functions import Function, Space, common_zeros
+from armlock.engine.polynomials import enclosed_roots, exact, order
 from armlock.stability.counts import at_points
 from armlock.systems import System
+
+if TYPE_CHECKING:
+    pass
+
+# How far right of the root that is returned no other one lies: the first share of abs(s), or of
+# one over the longest delay, if so fine a count is decided in so few steps. Otherwise it is the
+# second share of abs(Re s), or of one over the longest delay. Real parts that differ by less
+# than the first count as equal.
+_FINEST, _FINE = 1e-11, 1e-6
+_FEW_STEPS, _MANY_STEPS = 200_000, 2_000_000
+# The search for one root ends once it has cost so many steps, some five seconds.
+_ALL_STEPS = 4e6
+# Most points of one line, and from how many of them Newton's method starts.
+_MOST_POINTS, _MOST_STARTS = 500_000, 1000
+# The line next to the limit of a neutral chain has been searched with so many points.
+_ENOUGH_POINTS = 200_000
+# A line is followed up to where roots can lie right of it, and so many turns of the longest
+# delay further, but at first no longer than 1000 times that; with each line twice as far.
+_TURNS_FURTHER, _MOST_TURNS_FURTHER = 4.0, 3e4
+# So often the way from the limit of a chain to a line right of it is doubled.
+_MOST_DOUBLED = 64
+# Steps of Newton's method in double precision, and most in balls.
+_STEPS, _BALL_STEPS = 12, 60
+# Most roots near a line that are tried when the rightmost one is looked for.
+_MOST_TRIED = 8
+# Roots down to so many times one over the longest delay are looked for in steps of their size.
+_SLOWEST = 1e-9
+# So many times one over the longest delay left of the axis an exponential is no float.
+_LARGEST_EXPONENT = 600.0
+# Bits of balls, one after the other, and most roots in one disc, of at most this radius over
+# the size of the root.
+_BITS, _MOST_IN_A_DISC, _WIDEST = (192, 640, 2560), 12, 1e-3
+# Most roots that are listed, lines on which they are looked for, and the degree up to which
+# those of a map are roots of one polynomial.
+_MOST_ROOTS, _LINES, _LARGEST_MAP = 10_000, 24, 2000
+# Rounds of Newton's method for what is not yet known, and when two candidates are one.
+_ROUNDS, _SAME = 8, 1e-10
+
+
+class RootError(RuntimeError):
+    """Roots could not be certified; `estimate` is the best candidate, or those that were found.
+
+    Examples
+    --------
+    >>> from armlock import CommonArm, RootError, rightmost_root
+    >>> try:
+    ...     root = rightmost_root(CommonArm(), 1.01, 1.0)
+    ... except RootError as error:
+    ...     root = error.estimate
+    >>> print(f"{root.real:.2e}")
+    2.43e-04
+    """
+
+    def __init__(self, message: str, estimate: Any) -> None:
+        super().__init__(message)
+        self.estimate = estimate
+
+    def __reduce__(self) -> tuple[type[RootError], tuple[str, Any]]:
+        """Pickle the estimate along, so that the error passes from process to process."""
+        return type(self), (str(self), self.estimate)
+
+
+class _Disc(NamedTuple):
+    """A disc that holds so many roots, and perhaps one of as many conjugates."""
+
+    centre: acb
+    radius: arb
+    number: int
+    has_conjugate: bool
+
+    @property
+    def root(self) -> complex:
+        """The centre, rounded; what the radius leaves of a part is none."""
+        parts = self.centre.real, self.centre.imag
+        return complex(*(float(v) if abs(v) > self.radius else 0.0 for v in parts))
+
+    @property
+    def size(self) -> int:
+        """How many roots there are in it and its conjugate."""
+        return self.number * (2 if self.has_conjugate else 1)
+
+    def meets(self, other: _Disc) -> bool:
+        """Whether two discs may overlap."""
+        return not abs(self.centre - other.centre) > self.radius + other.radius
+
+
+class _Balls:
+    """F(s) / s^common in balls, as polynomials times exponentials."""
+
+    def __init__(self, function: Function, common: int) -> None:
+        polynomials = [p.exact for p in function.space.polynomials]
+        self.common, self.unit = common, 1.0 / (function.space.longest or 1.0)
+        now = function.steady - function.delayed.sum(axis=1)
+        columns = [(fmpq(0), now), *zip(function.space.delays, function.delayed.T, strict=True)]
+        self.parts = []
+        for theta, weights in columns:
+            terms = (p * w for p, w in zip(polynomials, weights, strict=True) if w)
+            p = sum(terms, fmpq_poly([0]))
+            if p:
+                self.parts.append((theta, _taylor(p)))
+        self.rounded: dict[int, list[tuple[arb, list[acb_poly]]]] = {}
+
+    def series(self, s: acb, number: int) -> list[acb]:
+        """Return so many Taylor coefficients at s; at a ball around s = 0 those of F s^-common.
+
+        Those of a ball bound what is left of the series, times a power of the radius.
+        """
+        at_zero = self.common if s.contains(0) else 0
+        size = number + at_zero
+        found = [acb(0)] * size
+        if flint.ctx.prec not in self.rounded:
+            self.rounded[flint.ctx.prec] = [
+                (-arb(theta), [acb_poly(p) for p in derivatives])
+                for theta, derivatives in self.parts
+            ]
+        for late, derivatives in self.rounded[flint.ctx.prec]:
+            values = [p(s) for p in derivatives[:size]]
+            turns = [acb(1)]
+            if late != 0:
+                turns = [(s * late).exp()]
+                for k in range(1, size):
+                    turns.append(turns[-1] * late / k)
+            for k, turn in enumerate(turns):
+                for i, value in enumerate(values[: size - k]):
+                    found[i + k] += value * turn
+        found = found[at_zero:]
+        for _ in range(self.common - at_zero):
+            # Over s + x, one coefficient after the other.
+            for k in range(number):
+                found[k] = (found[k] - (found[k - 1] if k else 0)) / s
+        return found
+
+    def enclosed(self, start: complex, numbers: Iterable[int]) -> _Disc | None:
+        """Follow Newton's method to a disc with one of some numbers of roots, or None."""
+        polished: dict[int, acb | None] = {}
+        for number, bits in itertools.product(numbers, _BITS):
+            with flint.ctx.workprec(bits):
+                if bits not in polished:
+                    polished[bits] = self._polished(acb(start.real, abs(start.imag)))
+                s = polished[bits]
+                if s is not None and (found := self._disc(s, number)):
+                    return found
+        return None
+
+    def _polished(self, s: acb) -> acb | None:
+        """Follow Newton's method for F / F', of which all roots are simple."""
+        small = arb(2) ** (-flint.ctx.prec // 2)
+        for _ in range(_BALL_STEPS):
+            f, slope, bend = self.series(s, 3)
+            below = slope * slope - 2 * f * bend
+            if f.contains(0) or below.contains(0):
+                return s
+            move = (f * slope / below).mid()
+            if not move.is_finite():
+                return None
+            s = (s - move).mid()
+            if abs(s) < small * small * self.unit:
+                return acb(0)
+            if abs(move) <= small * abs(s):
+                return s
+        return None
+
+    def _disc(self, s: acb, number: int) -> _Disc | None:
+        """Return a disc with so many roots around the real part of s, or around s, or None."""
+        next_to_real = s == 0 or abs(s.imag) < _WIDEST * abs(s)
+        if next_to_real and (found := self._holds(acb(s.real), number)):
+            return found
+        s = acb(s.real, abs(s.imag))
+        found = self._holds(s, number)
+        return found if found and s.imag > found.radius else None
+
+    def _holds(self, centre: acb, number: int) -> _Disc | None:
+        """Return a disc around a centre with exactly so many roots, or None (Lemma 25)."""
+        *lower, top = self.series(centre, number + 1)
+        least = top.abs_lower()
+        if not least > 0:
+            return None
+        smallest = arb(2) ** -flint.ctx.prec * (abs(centre) + arb(2) ** -flint.ctx.prec)
+        radius = smallest
+        for k, c in enumerate(lower):
+            part = 2 * (c.abs_upper() / least).root(number - k) if c.abs_upper() > 0 else arb(0)
+            radius = arb(part.upper()) if part > radius else radius
+        if not (radius == smallest or radius < _WIDEST * abs(centre)):
+            return None
+        around = centre + acb(arb(0, radius), arb(0, radius))
+        rest = self.series(around, number + 2)[-1].abs_upper() * radius ** (number + 1)
+        for k, c in enumerate(lower):
+            rest += c.abs_upper() * radius**k
+        if not least * radius**number > rest:
+            return None
+        return _Disc(centre, radius, number, centre.imag != 0)
+
+
+def _taylor(p: fmpq_poly) -> list[fmpq_poly]:
+    """Return a polynomial and its derivatives, each over the factorial of its order."""
+    found = [p]
+    while found[-1].degree() > 0:
+        found.append(found[-1].derivative() / len(found))
+    return found
+
+
+class _Line(NamedTuple):
+    """The function s -> F(s + sigma), as `Function.shifted` returns it, and its extent."""
+
+    space: Space
+    functions: inclusion.Functions
+    #: Up to about where roots can lie right of the line, in rad/s; inf past a chain's limit.
+    end: float
+    #: One turn of the longest delay that acts, in rad/s.
+    turn: float
+
+
+class _Search:
+    """A search for roots of F / s^common, and how many steps it has taken."""
+
+    def __init__(self, function: Function, common: int) -> None:
+        self.function, self.common, self.steps = function, common, 0.0
+        self.balls = _Balls(function, common)
+        self.unit = 1.0 / function.space.longest
+        self.further, self.points = _TURNS_FURTHER, 0
+        own = function.space.arrays
+        self.poles = np.unique(own.roots[own.present])
+
+    # Where an exponential overflows nothing is found.
+    @np.errstate(over="ignore", invalid="ignore")
+    def _line(self, sigma: float) -> _Line:
+        """Return the function on the line Re s = sigma."""
+        space, functions = self.function.shifted(sigma)
+        _, steady, delayed, uncertain = functions
+        end = float(space.confined_from(steady, delayed, uncertain)[0])
+        if np.isfinite(end) and not space.step:
+            end = _last_crossing(space, steady[0], delayed[0])
+        # Far to the right the longer delays no longer act.
+        acting = float(space.arrays.delays[delayed[0].any(axis=0)].max(initial=0.0))
+        turn = 2.0 * np.pi / (acting or space.longest)
+        return _Line(space, functions, end, turn)
+
+    def fine(self, root: complex) -> float:
+        """How far right of a root no other one lies, at most."""
+        return _FINE * max(abs(root.real), self.unit)
+
+    def first_line(self) -> float:
+        """Return a line just right of the limit of a neutral chain, or -inf without a chain.
+
+        Left of the limit no count is decided.
+        """
+        space, limits = self.function.space, self.function.limits
+        if space.step:
+            return -np.inf
+        if not limits[0]:
+            return np.inf
+        late = np.array([float(abs(c / limits[0])) for c in limits[1:]])
+        limit = chain.real_part_limit(space.lags, 1.0, late)
+        if not -_LARGEST_EXPONENT * self.unit <= limit < np.inf:
+            return limit if limit > 0.0 else -np.inf
+        step = 0.25 * self.fine(limit)
+        for _ in range(_MOST_DOUBLED):
+            if np.isfinite(self._line(limit + step).end):
+                return limit + step
+            step *= 2.0
+        return np.inf
+
+    def count(self, sigma: float, most: int) -> int:
+        """Count the roots right of a line; below zero where that is not decided."""
+        line = self._line(sigma)
+        if not np.isfinite(line.end):
+            return UNCONFINED
+        try:
+            found = decide.count(self.function, self.common, right_of=sigma, most=most)
+        except UndecidedError:
+            found = BOUNDARY
+        self.steps += min(line.end / line.turn, most) if found >= 0 else most
+        return found
+
+    def _moved(self, s: ComplexArray, known: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+        """Return where Newton's method leads for F over factors of known roots, and how far."""
+        with np.errstate(all="ignore"):
+            value, slope = self.function.value_and_slope(s)
+            away = (1.0 / np.subtract.outer(s, known)).sum(axis=1)
+            away = away + self.common / s if self.common else away
+            move = 1.0 / (slope / value - away)
+            move = np.where(value == 0.0, 0.0, move)
+            length = np.abs(move)
+        return s - move, np.where(np.isnan(length), np.inf, length)
+
+    def candidates(self, sigma: float) -> ComplexArray:
+        """Return where Newton's method leads from a line, the rightmost first."""
+        line = self._line(sigma)
+        end = line.end
+        if not line.space.step:
+            end = min(end, 1e3 * self.further * line.turn)
+            end += self.further * line.turn
+        begin = 1e-3 * _SLOWEST * line.turn
+        grid, move = inclusion.resolved(line.functions, begin, end, _MOST_POINTS)
+        self.points = grid.size
+        self.steps += self.points
+        s = sigma + 1j * grid
+        with np.errstate(all="ignore"):
+            move = move / (1.0 - self.common * move / s)
+            length = np.nan_to_num(np.abs(move), nan=np.inf)
+        # From where a step of Newton's method is locally shortest: no root close to the line
+        # lies between two of its points.
+        wider = np.pad(length, 1, constant_values=np.inf)
+        here = (length <= wider[:-2]) & (length < wider[2:])
+        s = (s - move)[here]
+        s = s[np.argsort(-s.real, kind="stable")][:_MOST_STARTS]
+        # Next to lightly damped poles rounding may hide D; its roots there lie next to them.
+        s = np.append(s, self.poles + 1e-3j * _SLOWEST * line.turn)
+        return self._led(s, line.turn)
+
+    def _led(
+        self, s: ComplexArray, turn: float, known: ComplexArray | tuple[()] = ()
+    ) -> ComplexArray:
+        """Return where Newton's method comes close to a root, the rightmost first."""
+        self.steps += _STEPS * s.size
+        length = np.full(s.shape, np.inf)
+        for _ in range(_STEPS):
+            s, length = self._moved(s, np.array(known, np.complex128))
+        # Slow roots are far smaller than a turn.
+        close = np.minimum(1e-5 * turn, 1e-3 * np.abs(s) + _SLOWEST * turn)
+        found = s[length <= close]
+        return found[np.argsort(-found.real, kind="stable")]
+
+    def near(self, sigma: float) -> tuple[complex, float] | None:
+        """Return the rightmost root found near a line, and the real part of those equal to it.
+
+        Of these it is the one of lowest frequency.
+        """
+        found = self.candidates(sigma)
+        for top in found[:_MOST_TRIED]:
+            equal = found[found.real >= top.real - _FINEST * max(abs(top), self.unit)]
+            lowest = equal[np.argmin(np.abs(equal.imag))]
+            disc = self.balls.enclosed(complex(lowest), range(1, 1 + _MOST_IN_A_DISC))
+            if disc is not None:
+                return disc.root, disc.root.real + float(top.real - lowest.real)
+        return None
+
+    def certified(self, root: complex, equal: float) -> complex | None:
+        """Return the root, or one between it and a line without roots on its right, or None."""
+        finest = _FINEST * max(abs(root), self.unit)
+        fine = max(finest, self.fine(root))
+        count = self.count(equal + finest, _FEW_STEPS)
+        if count < 0:
+            count = self.count(equal + fine, _MANY_STEPS)
+            between = self.near(equal + fine) if count == 0 else None
+            if between is not None and between[0].real > root.real + finest:
+                root = between[0]
+        if count == 0 and 0.0 < abs(root.real) <= fine:
+            # The side of the axis is that of the count.
+            count = self.count(0.0, _MANY_STEPS)
+            if count < 0:
+                return root if abs(root.real) <= finest else None
+            return root if (count > 0) == (root.real > 0.0) else None
+        return root if count == 0 else None
+
+    def right_of(self, sigma: float, number: int) -> list[_Disc]:
+        """Return discs of all roots right of a line, of which there are so many, or of some."""
+        found: list[_Disc] = []
+
+        def missing() -> int:
+            return number - sum(disc.size for disc in found)
+
+        def keep(starts: ComplexArray, numbers: Iterable[int]) -> bool:
+            """Enclose what is new, and tell whether something was."""
+            before, numbers = missing(), list(numbers)
+            for start in starts.tolist():
+                there = complex(start.real, abs(start.imag))
+                if any(abs(there - disc.root) <= _SAME * abs(there) for disc in found):
+                    continue
+                disc = self.balls.enclosed(there, numbers) if missing() > 0 else None
+                inside = disc and disc.centre.real - disc.radius > sigma
+                if disc and inside and not any(disc.meets(other) for other in found):
+                    found.append(disc)
+            return missing() < before
+
+        turns, line = np.exp(2j * np.pi * (np.arange(6) + 0.3) / 6.0), sigma
+        for k in range(_LINES):
+            candidates = self.candidates(line)
+            keep(candidates, [1])
+            for _ in range(_ROUNDS):
+                # Newton's method for F over the factors of what is known leads elsewhere.
+                known = np.array([disc.root for disc in found for _ in range(disc.number)])
+                known = np.concatenate((known, known[known.imag != 0.0].conj()))
+                starts = np.concatenate((self.poles, known, [line]))
+                starts = starts[np.argsort(np.abs(starts - line))][: _MOST_STARTS // 6]
+                around = 0.3 * np.abs(starts) + 1e-9 * self.unit
+                starts = (starts[:, None] + around[:, None] * turns).ravel()
+                if missing() <= 0 or not keep(self._led(starts, self.unit, known), [1]):
+                    break
+            if missing() > 0:
+                keep(candidates, range(2, 1 + min(missing(), _MOST_IN_A_DISC)))
+            if missing() <= 0:
+                break
+            self.further = min(2.0 * self.further, _MOST_TURNS_FURTHER)
+            line = sigma + 0.25 * self.unit * (2.0**k)
+        return found
+
+
+def _last_crossing(space: Space, steady: FloatArray, delayed: FloatArray) -> float:
+    """Frequency up to which delayed terms are as large as all else, from samples.
+
+    What a search finds depends on it, but no count.
+    """
+    omega = np.geomspace(1e-3 * space.corners[0], 1e6 * space.corners[-1], 500)
+    weights = np.vstack((steady - delayed.sum(1), delayed.T))
+    still = np.zeros((*weights.shape, delayed.shape[1]))
+    functions = inclusion.Functions(space.arrays, weights, still, np.zeros_like(weights))
+    sizes = np.abs(inclusion.values(functions, omega))
+    met = np.flatnonzero(sizes[0] <= sizes[1:].sum(0))
+    return float(omega[min(met[-1] + 1, 499)]) if met.size else 2.0 * np.pi / space.longest
+
+
+def _of_polynomial(function: Function, common: int) -> list[_Disc] | None:
+    """Return all roots of a function without delays, or of a map of low degree; else None.
+
+    Those of a map are logarithms of the roots of one polynomial of exp(s step).
+    """
+    space, step = function.space, exact(function.space.step)
+    if step and function.delayed.any():
+        backs = [int(theta / step) for theta in space.delays]
+        if max(backs) > _LARGEST_MAP:
+            return None
+        p = fmpq_poly([0])
+        now = function.steady.sum() - function.delayed.sum()
+        for back, weight in zip((0, *backs), (now, *function.delayed.sum(axis=0)), strict=True):
+            p += weight * fmpq_poly([0, 1]) ** (max(backs) - back)
+    elif function.delayed.any():
+        return None
+    else:
+        parts = zip(space.polynomials, function.steady, strict=True)
+        p = sum((weight * p.exact for p, weight in parts), fmpq_poly([0]))
+    p //= fmpq_poly([-1 if step else 0, 1]) ** common
+    if step and p:
+        p //= fmpq_poly([0, 1]) ** order(p.coeffs())
+    if p.degree() < 1:
+        return []
+    found = []
+    with flint.ctx.workprec(_BITS[0]):
+        for z, number in enclosed_roots(p):
+            if z.imag < 0:
+                continue
+            ball = z
+            if step:
+                flips = z.real < 0 and z.imag.contains(0)
+                ball = (-z if flips else z).log() / arb(step)
+                ball = acb(ball.real, arb.pi() / arb(step)) if flips else ball
+            radius = abs(acb(ball.real.rad(), ball.imag.rad())).upper()
+            has_conjugate = not z.imag.contains(0)
+            found.append(_Disc(ball.mid(), arb(radius), number, has_conjugate))
+    return sorted(found, key=lambda disc: (-disc.root.real, disc.root.imag))
+
+
+def rightmost_zero(function: Function, common: int = 0) -> complex:
+    """Return the root of F / s^common with the largest real part.
+
+    Line after line is tried. The rightmost root near a line is the one if a count just right of
+    it is zero. The counts on the lines enclose it, so that the interval between two lines is
+    halved until it is found.
+
+    Raises
+    ------
+    ValueError
+        If the function has no roots because it is constant.
+    RootError
+        If no root is certified.
+    """
+    if not function.delayed.any():
+        return _first(_of_polynomial(function, common))
+    try:
+        return _searched(function, common)
+    except RootError:
+        # Rounding may hide what the exact polynomial of a map tells.
+        all_of_map = _of_polynomial(function, common)
+        if all_of_map is None:
+            raise
+    return _first(all_of_map)
+
+
+def _first(discs: list[_Disc] | None) -> complex:
+    """Return the rightmost root of a polynomial."""
+    if not discs:
+        raise ValueError("the parameters must leave a loop with roots: D is constant")
+    return discs[0].root
+
+
+def _searched(function: Function, common: int) -> complex:
+    """Do what `rightmost_zero` does, by lines."""
+    search, best = _Search(function, common), complex(np.nan, np.nan)
+    # There are roots right of `low`, as far as is decided, and none right of `high`.
+    first = search.first_line()
+    low, high, sigma, width = -np.inf, np.inf, max(0.0, first), search.unit
+    small, why = _SLOWEST * search.unit, ""
+    if first == np.inf:
+        why = ": what is undelayed at the highest power of s is zero, or as rounding has it"
+    while search.steps < _ALL_STEPS and -_LARGEST_EXPONENT * search.unit < sigma < np.inf:
+        found = search.near(sigma)
+        # Next to the limit of a chain no count tells that roots lie right of `low`.
+        if found and found[0].real + search.fine(found[0]) > low:
+            best = found[0]
+            root = search.certified(*found)
+            if root is not None:
+                return root
+            low = max(low, best.real)
+        if low < sigma < high:
+            if search.count(sigma, _MANY_STEPS) == 0:
+                high = sigma
+            else:
+                low = sigma
+        if high == first and search.points > _ENOUGH_POINTS:
+            why = (
+                f": no root lies right of Re s = {first:.6g}, the limit that neutral root "
+                "chains may tend to"
+            )
+            break
+        search.further = min(2.0 * search.further, _MOST_TURNS_FURTHER)
+        if low > -np.inf and high < np.inf:
+            # Roots next to the axis may be slower than the delays by many decades.
+            sigma = float(small * np.sinh(0.5 * sum(np.arcsinh(np.array([low, high]) / small))))
+        else:
+            sigma = low + width if low > -np.inf else high - width
+            width *= 4.0
+        # No root is known between the limit of a chain and `high`.
+        if -np.inf < low < first or sigma < first:
+            sigma = first
+        elif sigma in (low, high):
+            break
+    raise RootError(
+        f"no rightmost root could be certified{why}; the best candidate is {best}", best
+    )
 
 
 def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> Any:

@@ -13,10 +13,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import mpmath
 import numpy as np
 import numpy.typing as npt
-from flint import fmpq, fmpq_poly
+from flint import arb, arb_mat, arb_poly, ctx, fmpq, fmpq_mat, fmpq_poly
 
 from armlock.checks import (
     FloatArray,
@@ -27,17 +26,13 @@ from armlock.checks import (
     whole_steps,
 )
 from armlock.engine.chain import NOW, Delay, Lag
-from armlock.engine.polynomials import collected, exact, polynomial
-from armlock.engine.roots import RootError
+from armlock.engine.polynomials import collected, exact
 from armlock.stability.counts import at_points
+from armlock.stability.roots import rightmost_root
 from armlock.systems import Sum, System
 
-# Digits of a map's coefficients.
-_DIGITS = 100
-# Bits of Schur's test, at first and at most.
-_BITS, _MOST_BITS = 800, 25600
-# A spectral radius is found to this share of itself. Below the least one it counts as zero.
-_SHARE, _LEAST = 2.0**-54, 1e-300
+# Bits of a map's coefficients.
+_BITS = 400
 
 
 def _continuous(system: Any) -> System:
@@ -57,14 +52,15 @@ def _at_point(system: Any, values: Any, numbers: Any) -> Sum:
     return found
 
 
-def _observer(a: fmpq_poly, delayed: list[fmpq_poly]) -> tuple[FloatArray, list[FloatArray]]:
+def _observer(a: fmpq_poly, delayed: list[fmpq_poly]) -> tuple[Any, list[Any]]:
     """Return F, and the column G_k of each delayed polynomial, which are of lower degree."""
-    powers = range(a.degree() - 1, -1, -1)
-    state = np.diag(np.ones(max(len(powers) - 1, 0)), 1)
-    whole, *columns = (
-        np.array([float(p[k] / a.leading_coefficient()) for k in powers]) for p in (a, *delayed)
-    )
-    state[:, 0] = -whole
+    powers, lead = range(a.degree() - 1, -1, -1), a.leading_coefficient()
+    state = fmpq_mat(len(powers), len(powers))
+    for i, k in enumerate(powers):
+        state[i, 0] = -a[k] / lead
+        if k:
+            state[i, i + 1] = fmpq(1)
+    columns = [fmpq_mat([[p[k] / lead] for k in powers]) for p in delayed]
     return state, columns
 
 
@@ -91,7 +87,7 @@ def _retarded(parts: dict[Any, fmpq_poly], size: int) -> None:
 
 def _realized(
     system: Any, values: Any, numbers: Any, step: float
-) -> tuple[FloatArray, list[FloatArray], list[int]]:
+) -> tuple[Any, list[Any], list[int]]:
     """Return F, the columns of delayed terms, and how many steps each of these is delayed."""
     # A delay whose parameter is zero keeps its place.
     whole = System.of(system)
@@ -105,46 +101,56 @@ def _realized(
 
 
 def _sampled(
-    state: FloatArray, delayed: list[FloatArray], step: float, order: int
+    state: Any, delayed: list[Any], step: float, order: int
 ) -> tuple[Any, list[tuple[Any, Any]]]:
     """Return exp(F h) and, per delayed term, the columns of its older and newer sample.
 
-    In extended precision: slow poles lie next to each other at z = 1, where rounded
+    In balls of many bits: slow poles lie next to each other at z = 1, where rounded
     coefficients would scatter them.
     """
-    states, h = len(state), mpmath.mpf(step)
-    flow, columns = mpmath.expm(mpmath.matrix(state.tolist()) * h), []
+    states, h = state.nrows(), exact(step)
+    flow, columns = (arb_mat(state) * arb(h)).exp(), []
     for column in delayed:
         # exp of this block matrix holds the integrals of exp(F u) G and of u exp(F u) G.
-        block = mpmath.zeros(states + 2)
-        block[:states, :states] = mpmath.matrix(state.tolist())
-        block[:states, states] = mpmath.matrix(column.tolist())
+        block = fmpq_mat(states + 2, states + 2)
+        for i in range(states):
+            for k in range(states):
+                block[i, k] = state[i, k]
+            block[i, states] = column[i, 0]
         block[states, states + 1] = 1 / h
-        integrals = mpmath.expm(block * h)
-        held, ramp = integrals[:states, states], integrals[:states, states + 1]
-        columns.append((held, 0 * held) if order == 0 else (held - ramp, ramp))
+        integrals = (arb_mat(block) * arb(h)).exp()
+        held, ramp = (
+            arb_mat([[integrals[i, k]] for i in range(states)]) for k in (states, states + 1)
+        )
+        columns.append((held, held * 0) if order == 0 else (held - ramp, ramp))
     return flow, columns
 
 
 def _map(
-    state: FloatArray, delayed: list[FloatArray], step: float, order: int
-) -> tuple[list[Any], list[list[Any]]]:
-    """Return A and the B_k of `semi_discretization` in ascending powers of z.
+    state: Any, delayed: list[Any], step: float, order: int
+) -> tuple[fmpq_poly, list[fmpq_poly]]:
+    """Return A and the B_k of `semi_discretization`, polynomials of z.
 
-    By the recursion of Faddeev and LeVerrier for the adjugate of z - exp(F h).
+    For a column v, the first row of adj(z - M) times v is det(z - M + v e_1) - det(z - M).
     """
     flow, columns = _sampled(state, delayed, step, order)
-    states = len(state)
-    a, b = [mpmath.mpf(1)], [[mpmath.mpf(0)] * (states + 1) for _ in columns]
-    power = mpmath.eye(states)
-    for k in range(1, states + 1):
-        for numerator, (older, newer) in zip(b, columns, strict=True):
-            numerator[states - k] += (power[0, :] * older)[0]
-            numerator[states - k + 1] += (power[0, :] * newer)[0]
-        power = flow * power
-        a.append(-sum(power[i, i] for i in range(states)) / k)
-        power += a[-1] * mpmath.eye(states)
-    return a[::-1], b
+    states, whole = state.nrows(), flow.charpoly()
+
+    def first_of_adjugate(column: Any) -> Any:
+        moved = arb_mat(flow)
+        for i in range(states):
+            moved[i, 0] -= column[i, 0]
+        return moved.charpoly() - whole
+
+    z = arb_poly([0, 1])
+    parts = [first_of_adjugate(v) + z * first_of_adjugate(w) for v, w in columns]
+    return _middle(whole), [_middle(p) for p in parts]
+
+
+def _middle(p: Any) -> fmpq_poly:
+    """Return the middle of a polynomial in balls, exactly."""
+    pairs = (c.mid().man_exp() for c in p.coeffs())
+    return fmpq_poly([fmpq(m) * fmpq(2) ** int(e) for m, e in pairs])
 
 
 def transition_matrix(
@@ -223,18 +229,18 @@ def transition_matrix(
     """
     step = _checked(step, order)
     state, delayed, steps = _realized(system, values, numbers, step)
-    states, longest = len(state), max(steps, default=0)
+    states, longest = state.nrows(), max(steps, default=0)
     # The matrix, and what its eigenvalues take.
     check_memory("step", (states + longest,) * 2, 24)
-    with mpmath.workdps(_DIGITS):
+    with ctx.workprec(_BITS):
         flow, columns = _sampled(state, delayed, step, order)
     matrix = np.zeros((states + longest, states + longest))
     matrix[:states, :states] = np.array(flow.tolist(), np.float64)
     # The present sample is the first state, older ones stand behind the states.
     place = [0, *range(states, states + longest)]
     for back, (older, newer) in zip(steps, columns, strict=True):
-        matrix[:states, place[back]] += np.array(list(older), np.float64)
-        matrix[:states, place[back - 1]] += np.array(list(newer), np.float64)
+        matrix[:states, place[back]] += np.array(older.tolist(), np.float64)[:, 0]
+        matrix[:states, place[back - 1]] += np.array(newer.tolist(), np.float64)[:, 0]
     # A step later each sample is one step older.
     matrix[place[1:], place[:-1]] = 1.0
     return matrix
@@ -277,14 +283,12 @@ def spectral_radius(
         As `unstable_roots`, and if the step does not divide a delay, the order is not 0 or 1,
         or the loop is neutral.
     RootError
-        If Schur's test is not decided.
+        If the rightmost root of the map is not certified, see `rightmost_root`.
 
     Notes
     -----
-    Schur's test tells whether all roots of the characteristic polynomial lie within a circle.
-    The coefficients have 100 digits, and the rounding of the test is bounded. The spectral
-    radius lies between a circle that passes the test and one that does not, found by halving
-    an interval.
+    It is exp(h Re s) of the rightmost root s of the map, see `semi_discretization`, whose
+    coefficients are known to some 100 digits.
 
     Examples
     --------
@@ -294,61 +298,13 @@ def spectral_radius(
     """
     system, points, shape = at_points(system, values, numbers)
     h = _checked(step, order)
-    radii = [_radius(system, point, h, order) for point in points.tolist()]
-    return np.array(radii, np.float64).reshape(shape)
+    maps = (semi_discretization(_fixed(system, point), h, order) for point in points.tolist())
+    return np.exp([h * rightmost_root(one).real for one in maps]).reshape(shape)
 
 
-def _radius(system: System, point: list[float], step: float, order: int) -> float:
-    """Return the spectral radius at one point."""
-    state, delayed, steps = _realized(system, point, {}, step)
-    with mpmath.workdps(_DIGITS):
-        a, b = _map(state, delayed, step, order)
-        longest = max(steps, default=0)
-        powers = [mpmath.mpf(0)] * longest + a
-        for back, numerator in zip(steps, b, strict=True):
-            late = longest - back
-            for k, value in enumerate(numerator):
-                powers[late + k] -= value
-        # Halving leads to no circle of radius one, on which a root often lies.
-        low, high = mpmath.mpf(0), mpmath.mpf(3) / 2
-        while not _within(powers, high):
-            low, high = high, 2 * high
-        while high - low > _SHARE * high and high > _LEAST:
-            middle = (low + high) / 2
-            low, high = (low, middle) if _within(powers, middle) else (middle, high)
-        return float(high)
-
-
-def _within(powers: list[Any], radius: Any) -> bool:
-    """Whether all roots of a polynomial lie within a radius."""
-    bits = _BITS
-    while (found := _schur(powers, radius, bits)) is None:
-        bits *= 2
-        if bits > _MOST_BITS:
-            raise RootError(
-                f"it is not decided whether a root exceeds {radius}", complex(radius)
-            )
-    return found
-
-
-def _schur(powers: list[Any], radius: Any, bits: int) -> bool | None:
-    """Test step by step whether all roots lie within a radius; None if it is not decided.
-
-    In whole multiples of 2^-bits, with a bound of what they are off by.
-    """
-    with mpmath.workprec(bits):
-        scaled = [value * radius**k for k, value in enumerate(powers)]
-        largest = max(map(abs, scaled))
-        p = np.array([int(mpmath.ldexp(v / largest, bits)) for v in scaled], dtype=object)
-    off = 8 * len(p)
-    while len(p) > 1:
-        lead, last = abs(p[-1]) - off, abs(p[0]) + off
-        if last >= lead:
-            return False if last - lead > 4 * off else None
-        share, wrong = (p[0] << bits) // p[-1], (2 * off << bits) // lead + 1
-        off = 2 * off + (wrong * (abs(p).max() + off) >> bits) + 3
-        p = p[1:] - (p[-2::-1] * share >> bits)
-    return True
+def _fixed(system: System, point: list[float]) -> System:
+    """Return the equation of a system at a point."""
+    return System(_at_point(system, point, {}), Sum({}), {})
 
 
 def semi_discretization(
@@ -398,8 +354,8 @@ def semi_discretization(
         W_k &= \int_0^h e^{F (h - u)}\, G_k\, \frac{u}{h}\, \mathrm{d}u
 
     to order 1. To order 0 the newer sample does not enter, W_k = 0. At z = 1 the map is a
-    multiple of D(0) of the loop. The coefficients are rounded so that this holds exactly: a
-    root at s = 0 stays a root at z = 1.
+    multiple of D(0) of the loop. The coefficients, of some 100 digits, are such that this holds
+    exactly: a root at s = 0 stays a root at z = 1.
 
     Examples
     --------
@@ -425,9 +381,9 @@ def semi_discretization(
     _retarded(late, size)
     steps = [_steps(lag, step) for lag, _ in late]
     state, columns = _observer(undelayed, list(late.values()))
-    with mpmath.workdps(_DIGITS):
+    with ctx.workprec(_BITS):
         above, below = _map(state, columns, step, order)
-        maps = [polynomial(float(v) for v in p) for p in (above, *below)]
+    maps = [above, *below]
     at_rest = [undelayed[0], *(p[0] for p in late.values())]
     maps = _with_root_at_one(maps, at_rest)
     q, found = Delay.new(exact(step)), Sum({})
