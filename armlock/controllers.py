@@ -227,7 +227,7 @@ def rational(
         )
         above, below = powers
         parts = statespace.of_coefficients(above, below, integrators, zeros)
-    return Controller.of_polynomials(*map(Polynomial.of, parts))
+    return Controller.of_polynomials(*parts)
 
 
 def _of_system(system: Any) -> Controller:

@@ -368,13 +368,14 @@ def _determinant(rows: Sequence[Sequence[Sum]]) -> Sum:
     minors, products = {0: _ONE}, 0
     for row in rows:
         found: dict[int, Sum] = {}
+        both = [(j, (entry, -entry)) for j, entry in enumerate(row) if entry]
         for columns, minor in minors.items():
-            for j, entry in enumerate(row):
-                if entry and not columns >> j & 1:
+            for j, signed in both:
+                if not columns >> j & 1:
+                    entry = signed[(columns >> j).bit_count() % 2]
                     products += len(minor.terms) * len(entry.terms)
                     term = minor * entry
                     key = columns | 1 << j
-                    term = -term if (columns >> j).bit_count() % 2 else term
                     found[key] = found[key] + term if key in found else term
             if products > _MOST_PRODUCTS:
                 raise ValueError(

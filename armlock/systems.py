@@ -201,11 +201,14 @@ class Sum:
         One for each product of parameters, beginning with what stands before none.
         """
         longest = max((lag.time for lag in self.lags), default=fmpq(0))
-        growth = fmpq_poly([longest**k / factorial(k) for k in range(number)])
+        growth = [ROUNDED * longest**k / factorial(k) for k in range(number)]
         found = []
         for names, size in sorted(self.sizes.items()):
-            bounds = ROUNDED * size * growth
-            found.append(Lowest(self.series(number, names), [bounds[k] for k in range(number)]))
+            bounds = [
+                sum((size[i] * growth[k - i] for i in range(k + 1)), fmpq(0))
+                for k in range(number)
+            ]
+            found.append(Lowest(self.series(number, names), bounds))
         return found
 
     def without(self, stated: int) -> Sum:
@@ -233,9 +236,9 @@ class Sum:
         """Return the first coefficients at s = 0 of what stands before parameters, exactly."""
         found = [fmpq(0)] * number
         for lag, p in self.before(*names).items():
-            for i, c in enumerate(p.coeffs()[:number]):
+            for i in range(min(number, len(p))):
                 for k in range(i, number):
-                    found[k] += c * (-lag.time) ** (k - i) / factorial(k - i)
+                    found[k] += p[i] * (-lag.time) ** (k - i) / factorial(k - i)
         return found
 
     def order(self) -> int:
@@ -335,6 +338,8 @@ class Sum:
 
 def _times(a: Sizes, b: Sizes) -> Sizes:
     """Multiply sizes."""
+    if len(a) == len(b) == 1 and () in a and () in b:
+        return {(): a[()] * b[()]}
     return collected((tuple(sorted(m + n)), p * q) for m, p in a.items() for n, q in b.items())
 
 
@@ -730,8 +735,9 @@ class System:
             )
             text = f"{terms}{' = 0' if self.is_equation else ''}"
         named = f", parameters {', '.join(self.parameters)}" if self.parameters else ""
+        stated = f", without {self.at_zero} roots at s = 0" if self.at_zero else ""
         what = "equation" if self.is_equation else "open loop"
-        return f"<{what} {text}{named}>"
+        return f"<{what} {text}{named}{stated}>"
 
     def _repr_latex_(self) -> str | None:
         text = self._equation(latex=True)

@@ -15,6 +15,7 @@ from armlock import (
     System,
     box_count,
     critical_perturbation,
+    d_curve_line,
     delay,
     determinant,
     equation,
@@ -497,6 +498,8 @@ def test_what_is_stated_holds_for_all_parameters_and_stays():
     loop = k * averaging(1.0) / (s + q)
     made = equation(1 + loop, at_zero=1)
     assert made.at_zero == made.at(k=2.0).at_zero == 1
+    assert repr(made).endswith("= 0, parameters k, q, without 1 roots at s = 0>")
+    assert d_curve_line(made) == d_curve_line(loop) == (1.0, 1.0, 0.0)
     assert pickle.loads(pickle.dumps(made)) == made != equation(1 + loop)
     gains = np.linspace(-4.0, 30.0, 9)
     assert unstable_roots(made, k=gains).tolist() == unstable_roots(loop, k=gains).tolist()

@@ -12,14 +12,13 @@ it is stated how many poles and zeros are meant to be at s = 0.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import islice
 from typing import Any, NamedTuple
 
 import flint
 from flint import fmpq, fmpq_poly
 
 from armlock.checks import whole_number
-from armlock.engine.polynomials import Polynomial, exact, polynomial
+from armlock.engine.polynomials import Polynomial, exact
 
 #: What rounding makes of a determinant: at most this share of sum |a_ij cofactor_ij|. It covers
 #: all changes of coordinates that were drawn, of two to five states.
@@ -92,27 +91,33 @@ def settled(
 
 def of_matrices(
     matrices: Sequence[Any], integrators: int | None, zeros: int | None
-) -> tuple[fmpq_poly, fmpq_poly]:
+) -> tuple[Polynomial, Polynomial]:
     """Return numerator and denominator of C (s - A)^-1 B + D of matrices of floats."""
     a, b, c, ((d,),) = matrices
     if not len(a):
-        return polynomial([d]), polynomial([1])
+        return Polynomial.of([d]), Polynomial.of([1])
     first, column, row, through = _matrix(a), _matrix(b), _matrix(c), exact(d)
     coefficients, adjugates = _cofactors(first)
     below = fmpq_poly(coefficients)
     above = (first - column * row).charpoly() - below + through * below
-    bounds = _bounds(adjugates, first), _bounds_of_zeros(a, b, c, d, above)
-    return _quotient(above, below, through, (integrators, zeros), bounds)
+    bounds = _bounds(below, adjugates, first), _bounds_of_zeros(a, b, c, d, above)
+    found = _quotient(above, below, through, (integrators, zeros), bounds)
+    return Polynomial.of(found[0]), Polynomial.of(found[1])
 
 
 def of_coefficients(
     above: Any, below: Any, integrators: int | None, zeros: int | None
-) -> tuple[fmpq_poly, fmpq_poly]:
+) -> tuple[Polynomial, Polynomial]:
     """Return a quotient of polynomials that were multiplied out, in ascending powers."""
-    above, below = polynomial(above), polynomial(below)
+    given = Polynomial.of(above), Polynomial.of(below)
+    above, below = (p.exact for p in given)
     through = above[below.degree()] / below.leading_coefficient()
-    bounds = _bounds_of_product(below), _bounds_of_product(above)
-    return _quotient(above, below, through, (integrators, zeros), bounds)
+    bounds = _bounds_of_product(given[1]), _bounds_of_product(given[0])
+    found = _quotient(above, below, through, (integrators, zeros), bounds)
+    one, other = (
+        p if p.exact == q else Polynomial.of(q) for p, q in zip(given, found, strict=True)
+    )
+    return one, other
 
 
 def _quotient(
@@ -162,15 +167,17 @@ def _cofactors(matrix: Any) -> tuple[list[fmpq], list[Any]]:
     return coefficients, found[::-1]
 
 
-def _bounds(adjugates: Iterable[Any], weights: Any) -> list[fmpq]:
+def _bounds(value: fmpq_poly, adjugates: Iterable[Any], weights: Any) -> list[fmpq]:
     """Return what rounding makes of the lowest coefficients of a determinant.
 
-    The derivative by an entry is its cofactor.
+    The derivative by an entry is its cofactor. The last one is larger than rounding.
     """
-    found = []
-    for adjugate in islice(adjugates, _ASKED):
+    found: list[fmpq] = []
+    for k, adjugate in enumerate(adjugates):
         pairs = zip(weights.entries(), adjugate.transpose().entries(), strict=True)
         found.append(ROUNDED * sum((abs(x * y) for x, y in pairs), fmpq(0)))
+        if value[k] and abs(value[k]) >= found[k]:
+            break
     return found
 
 
@@ -192,16 +199,16 @@ def _bounds_of_zeros(a: Any, b: Any, c: Any, d: float, value: fmpq_poly) -> list
     adjugates = (
         sum((m * inverse[i, j] for j, m in enumerate(known)), 0 * matrix) for i in size
     )
-    return _bounds(adjugates, matrix)
+    return _bounds(value, adjugates, matrix)
 
 
-def _bounds_of_product(p: fmpq_poly) -> list[fmpq]:
+def _bounds_of_product(given: Polynomial) -> list[fmpq]:
     """Return what rounding makes of the lowest coefficients of a polynomial multiplied out.
 
     Its roots are rounded by a share of the largest one, which python-control does to state
     spaces. A bound is zero where so many roots are not next to s = 0.
     """
-    largest = exact(max(map(abs, Polynomial.of(p).roots), default=0.0)) if p else fmpq(0)
+    p, largest = given.exact, exact(max(map(abs, given.roots), default=0.0))
     found = []
     for first in range(_ASKED):
         bounds = [fmpq(0)]

@@ -255,7 +255,10 @@ def d_curve_line(system: System, **numbers: float) -> Line:
     Line of omega = 0: 1 x + 1 y = 2
     """
     system, x, y = _two(system, numbers)
-    value, first, second = (f.series(1)[0] for f in Affine(system, (x, y)).terms)
+    # Of the roots at s = 0 that are left out the next coefficient decides.
+    order = system.cancelled() if system.at_zero is None else system.at_zero
+    terms = Affine(system, (x, y)).terms
+    value, first, second = (f.series(order + 1)[order] for f in terms)
     scale = max(first, second, key=abs)
     if not scale:
         raise ValueError(
