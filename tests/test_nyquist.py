@@ -22,6 +22,7 @@ from armlock import (
     flight_loop,
     nyquist,
     paper_loop,
+    s,
     unstable_roots,
 )
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
@@ -288,3 +289,23 @@ def test_undamped_pairs_that_were_multiplied_out_stay_on_the_axis(below):
     for loop in (Loop(given, "single", 1.3), System.of(given) * (1 - 0.9 * delay(1.3))):
         with pytest.raises(ValueError, match="no pole on the imaginary axis except at s = 0"):
             nyquist(loop)
+
+
+def test_a_curve_is_computed_when_it_is_read(monkeypatch):
+    def refused(*_, **__):
+        raise AssertionError("the curve was computed")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Loop, "__call__", refused)
+        curve = nyquist(paper_loop())
+        assert curve.encirclements == 0
+        with pytest.raises(AssertionError, match="was computed"):
+            _ = curve.response
+    assert curve.response == pytest.approx(paper_loop()(1j * curve.omega), rel=1e-12)
+
+
+def test_a_curve_of_terms_that_cancel_has_all_digits():
+    lag = (1 - (1 - delay(1.0)) / s) / s
+    curve = nyquist(0.5 * (2 * lag) ** 3)
+    assert curve.response[0] == pytest.approx(0.5, rel=1e-2)
+    assert np.abs(np.diff(curve.response[:1000])).max() < 0.1

@@ -7,10 +7,12 @@ roots and the number P of unstable poles of L. The samples of the curve are for 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from armlock.affine import open_quotient
 from armlock.checks import BoolArray, ComplexArray, FloatArray, positive_number
@@ -45,6 +47,36 @@ _SHOWN = 10
 _NEGLIGIBLE = 5e-4
 
 
+class _Path(NamedTuple):
+    """Where a curve is drawn: the loop at its parameters, and from which frequency to which."""
+
+    loop: System
+    point: dict[str, Any]
+    space: Space
+    per_turn: float
+    start: float
+    end: float
+
+    def response(self, s: npt.ArrayLike) -> ComplexArray:
+        """Evaluate L."""
+        return self.loop(s, **self.point)
+
+    def omega(self) -> FloatArray:
+        """Frequencies close enough to draw the curve; finer at first, and around resonances.
+
+        Past a thousand turns of the delays no picture shows one turn beside the next.
+        """
+        per_turn, start, end = self.per_turn, self.start, self.end
+        first = np.arange(0.0, min(4.0 * per_turn, end), per_turn / 2000.0)
+        resolved = min(1000.0 * per_turn, end)
+        whole = np.arange(0.0, resolved, per_turn / 400.0)
+        far = np.geomspace(resolved, end, 100_000) if end > resolved else whole[:0]
+        around = self.space.around_roots()
+        grids = np.geomspace(start, end, 4000), first, whole, far, around, [end]
+        every = np.concatenate(grids)
+        return np.unique(every[(every >= start) & (every <= end)])
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class NyquistCurve(Shown):
     """The open loop along the indented Nyquist contour, for omega >= 0.
@@ -77,14 +109,32 @@ class NyquistCurve(Shown):
     (1, 0)
     """
 
-    omega: FloatArray
-    response: ComplexArray
-    indentation: ComplexArray
-    indentation_response: ComplexArray
     pole_order: int
     encirclements: int
     open_loop_poles: int
     closed_loop_roots: int
+    _path: _Path = field(repr=False)
+
+    @cached_property
+    def omega(self) -> FloatArray:
+        """Frequencies, which are found when they are read."""
+        return self._path.omega()
+
+    @cached_property
+    def response(self) -> ComplexArray:
+        """L on the axis, which is computed when it is read."""
+        return self._path.response(1j * self.omega)
+
+    @cached_property
+    def indentation(self) -> ComplexArray:
+        """The quarter circle around s = 0."""
+        angle = 0.5 * np.pi * np.linspace(0.0, 1.0, 64 if self.pole_order else 0)
+        return np.asarray(self._path.start * np.exp(1j * angle))
+
+    @cached_property
+    def indentation_response(self) -> ComplexArray:
+        """L on the quarter circle."""
+        return self._path.response(self.indentation)
 
     def _table(self) -> Table:
         """Show the numbers of the theorem first."""
@@ -169,20 +219,6 @@ def open_loop_poles(m: Function) -> int:
     return count
 
 
-def _drawing_grid(space: Space, per_turn: float, start: float, end: float) -> FloatArray:
-    """Frequencies close enough to draw the curve; finer at first, and around resonances.
-
-    Past a thousand turns of the delays no picture shows one turn beside the next.
-    """
-    first = np.arange(0.0, min(4.0 * per_turn, end), per_turn / 2000.0)
-    resolved = min(1000.0 * per_turn, end)
-    whole = np.arange(0.0, resolved, per_turn / 400.0)
-    far = np.geomspace(resolved, end, 100_000) if end > resolved else whole[:0]
-    grids = np.geomspace(start, end, 4000), first, whole, far, space.around_roots(), [end]
-    every = np.concatenate(grids)
-    return np.unique(every[(every >= start) & (every <= end)])
-
-
 def _leading_radius(n: Function, m: Function) -> tuple[int, float]:
     """Order of the pole of N / M at s = 0, and up to which abs(s) L is as simple as it gets.
 
@@ -262,17 +298,14 @@ def nyquist(
     end = max(1.05 * last, 10.0 / longest, 10.0 * radius)
     if omega_max is not None:
         end = max(end, positive_number("omega_max", omega_max))
-    omega = _drawing_grid(n.space, 2.0 * np.pi / longest, radius, end)
-    arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))[slice(64 if order else 0)]
+    given = System.of(loop)
+    numbers = dict(zip(given.parameters, point.tolist(), strict=True))
     return NyquistCurve(
-        omega=omega,
-        response=_response(n, m, omega),
-        indentation=arc,
-        indentation_response=n.value_and_slope(arc)[0] / m.value_and_slope(arc)[0],
         pole_order=order,
         encirclements=count - poles,
         open_loop_poles=poles,
         closed_loop_roots=count,
+        _path=_Path(given, numbers, n.space, 2.0 * np.pi / longest, radius, end),
     )
 
 
