@@ -52,6 +52,16 @@ def test_errors_add_up():
     np.testing.assert_allclose(both, one + other, rtol=1e-12)
 
 
+def test_several_errors_are_pulled_as_each_of_them_alone():
+    loop, time, errors = paper_loop(), np.array([5e3, 1e4]), np.eye(3)
+    found = pulling(loop, time, common=errors, differential=STEP)
+    peaks = largest_pulling(loop, common=errors)
+    assert found.shape == (3, 2)
+    for k, error in enumerate(errors):
+        assert (found[k] == pulling(loop, time, common=error, differential=STEP)).all()
+        assert (peaks.size[k], peaks.time[k]) == largest_pulling(loop, common=error)
+
+
 def test_the_largest_pulling_is_not_exceeded_at_other_times():
     simple = Loop(Controller([-0.1], [0, 0], 3.0), dual(2.5, 0.065), 16.68, 16.615)
     for loop, source in ((simple, "common"), (paper_loop(), "differential")):

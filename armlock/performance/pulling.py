@@ -8,19 +8,16 @@ computed as an inverse Laplace transform.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import FloatArray, axis, positive_array
+from armlock.checks import ComplexArray, FloatArray, finite_series, positive_array
 from armlock.loops import Loop
 from armlock.performance.transfer import require_stable, responses
 
-#: Errors of the sum and of the difference of the two arms: nu0, gamma and alpha of each.
-Errors = tuple[FloatArray, FloatArray]
-
+_SOURCES = "common", "differential"
 # Times of which half and one in eight more are kept: a series that begins at zero.
 _SAMPLES = 1 << 20
 # The response one period later comes in weakened by exp(-26) = 5e-12. As half of these powers
@@ -38,18 +35,21 @@ _EARLIEST, _LATEST = 1.0, 1728e3
 
 
 class Peak(NamedTuple):
-    """The largest pulling: its size in Hz, and how many s after the error began it occurs."""
+    """The largest pulling: its size in Hz, and how many s after the error began it occurs.
 
-    size: float
-    time: float
+    Two floats, or two arrays for several errors.
+    """
+
+    size: Any
+    time: Any
 
 
 def pulling(
     loop: Loop,
     time: npt.ArrayLike,
     *,
-    common: Sequence[float] = (1.0, 0.0, 0.0),
-    differential: Sequence[float] = (0.0, 0.0, 0.0),
+    common: npt.ArrayLike = (1.0, 0.0, 0.0),
+    differential: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> FloatArray:
     r"""Compute how the locked laser follows Doppler errors that begin at time zero.
 
@@ -67,13 +67,14 @@ def pulling(
         The loop, stable at c1 = c2 = 1.
     time : array_like of float
         In s, positive, any shape.
-    common, differential : sequence of three floats, optional
+    common, differential : array_like of float, shape (3,) or (n, 3), optional
         nu0 in Hz, gamma in Hz/s and alpha in Hz/s^2 of the sum and of the difference of the two
-        arms' errors. An error of arm 1 alone is the same in both.
+        arms' errors. An error of arm 1 alone is the same in both. Several errors, one in each
+        row, take hardly longer than one.
 
     Returns
     -------
-    float array, shaped like `time`
+    float array, shaped like `time`, or (n, ...) for several errors
         Frequency of the locked laser in Hz, without the noise of the laser.
 
     Raises
@@ -104,18 +105,22 @@ def pulling(
     """
     require_stable(loop)
     t = positive_array("time", time)
-    errors = _error("common", common), _error("differential", differential)
-    found = np.empty(t.shape)
+    errors = _errors(common, differential)
+    found = np.empty((*errors.shape[:-2], *t.shape))
     # The least power of two that is larger than the time.
     series = -(-np.frexp(t)[1] // _RATIO_BITS)
     for k in np.unique(series):
         asked = series == k
-        at, frequency, ends = _series(loop, 2.0 ** (_RATIO_BITS * int(k)), errors)
-        found[asked] = np.where(t[asked] > ends, np.nan, np.interp(t[asked], at, frequency))
-    if np.isnan(found).any():
+        response = _Response(loop, 2.0 ** (_RATIO_BITS * int(k)))
+        for error in np.ndindex(errors.shape[:-2]):
+            frequency, ends = response.to(errors[error])
+            value = np.interp(t[asked], response.time, frequency)
+            found[(*error, asked)] = np.where(t[asked] > ends, np.nan, value)
+    gone = np.isnan(found).any(axis=tuple(range(errors.ndim - 2)))
+    if gone.any():
         warnings.warn(
-            f"the response has decayed below rounding errors at time = "
-            f"{t[np.isnan(found)].min():g} s and is nan there", stacklevel=2,
+            f"the response has decayed below rounding errors at time = {t[gone].min():g} s and "
+            "is nan there", stacklevel=2,
         )  # fmt: skip
     return found
 
@@ -123,8 +128,8 @@ def pulling(
 def largest_pulling(
     loop: Loop,
     *,
-    common: Sequence[float] = (0.0, 0.0, 0.0),
-    differential: Sequence[float] = (0.0, 0.0, 0.0),
+    common: npt.ArrayLike = (0.0, 0.0, 0.0),
+    differential: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> Peak:
     """Find the largest pulling between one second and twenty days after an error begins.
 
@@ -140,51 +145,63 @@ def largest_pulling(
         certified.
     """
     require_stable(loop)
-    errors = _error("common", common), _error("differential", differential)
-    peaks = []
+    errors = _errors(common, differential)
+    size, at = np.zeros(errors.shape[:-2]), np.zeros(errors.shape[:-2])
     duration = _EARLIEST
     while duration < _LATEST:
         begin, duration = duration, min(duration * 2.0**_RATIO_BITS, _LATEST)
-        time, frequency, _ = _series(loop, begin * 2.0**_RATIO_BITS, errors)
-        sizes = np.where((time < begin) | (time > duration), 0.0, np.abs(frequency))
-        best = int(np.argmax(sizes))
-        peaks.append(Peak(float(sizes[best]), float(time[best])))
-    return max(peaks)
+        response = _Response(loop, begin * 2.0**_RATIO_BITS)
+        outside = (response.time < begin) | (response.time > duration)
+        for error in np.ndindex(size.shape):
+            frequency = np.where(outside, 0.0, np.abs(response.to(errors[error])[0]))
+            best = int(np.argmax(frequency))
+            if frequency[best] > size[error]:
+                size[error], at[error] = frequency[best], response.time[best]
+    return Peak(*((size, at) if size.ndim else (float(size), float(at))))
 
 
-def _error(name: str, values: Sequence[float]) -> FloatArray:
-    """Return nu0, gamma and alpha, or raise."""
-    error = axis(name, values)
-    if error.size != 3:
-        raise ValueError(f"{name} must hold nu0, gamma and alpha, got {error.size} numbers")
-    return error
+def _errors(common: npt.ArrayLike, differential: npt.ArrayLike) -> FloatArray:
+    """Return nu0, gamma and alpha of both, shape (2, 3) or (n, 2, 3), or raise."""
+    found = (
+        finite_series("common", common, 1, 2),
+        finite_series("differential", differential, 1, 2),
+    )
+    for name, error in zip(_SOURCES, found, strict=True):
+        if error.shape[-1] != 3:
+            raise ValueError(
+                f"{name} must hold nu0, gamma and alpha, or rows of them, got shape "
+                f"{error.shape}"
+            )
+    return np.stack(np.broadcast_arrays(*found), axis=-2)
 
 
-@np.errstate(all="ignore")
-def _series(
-    loop: Loop, duration: float, errors: Errors
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return times from zero to past a duration, the frequency of the laser, and a time.
+class _Response:
+    """The responses of a loop to both errors, from time zero to past a duration."""
 
-    After this time the frequency is smaller than rounding errors.
-    """
-    step = 2.0 * duration / _SAMPLES
-    shift = _DAMPED / (2.0 * duration)
-    omega = 2.0 * np.pi * np.fft.rfftfreq(_SAMPLES, step)
-    s = shift + 1j * omega
-    found = responses(loop, s, ("common", "differential"))
-    total = np.zeros(s.shape, dtype=np.complex128)
-    for source, (nu0, gamma, alpha) in zip(("common", "differential"), errors, strict=True):
-        total += found[source] * (nu0 / s + gamma / s**2 + alpha / s**3)
-    if not np.isfinite(total).all():
-        raise ValueError(
-            f"time must not be so short or long that its third power overflows, got times next "
-            f"to {duration:g} s"
-        )
-    total *= np.exp(-0.5 * (omega * _SMOOTHED * step) ** 2)
-    time: FloatArray = step * np.arange(9 * _SAMPLES // 16, dtype=np.float64)
-    growth = np.exp(shift * time)
-    frequency = np.fft.irfft(total, _SAMPLES)[: time.size] / step * growth
-    rounding = _ROUNDING * np.abs(total).sum() / (_SAMPLES * step) * growth
-    above = np.flatnonzero(np.abs(frequency) >= rounding)
-    return time, np.asarray(frequency), float(time[above[-1]])
+    def __init__(self, loop: Loop, duration: float) -> None:
+        self.duration = duration
+        self.step, self.shift = 2.0 * duration / _SAMPLES, _DAMPED / (2.0 * duration)
+        self.time: FloatArray = self.step * np.arange(9 * _SAMPLES // 16, dtype=np.float64)
+        omega = 2.0 * np.pi * np.fft.rfftfreq(_SAMPLES, self.step)
+        self.s = self.shift + 1j * omega
+        smooth = np.exp(-0.5 * (omega * _SMOOTHED * self.step) ** 2)
+        with np.errstate(all="ignore"):
+            found = responses(loop, self.s, _SOURCES)
+        self.found: list[ComplexArray] = [smooth * found[source] for source in _SOURCES]
+
+    @np.errstate(all="ignore")
+    def to(self, errors: FloatArray) -> tuple[FloatArray, float]:
+        """Return the frequency of the laser, and after which time it is below rounding."""
+        total = np.zeros(self.s.shape, dtype=np.complex128)
+        for response, (nu0, gamma, alpha) in zip(self.found, errors, strict=True):
+            total += response * (nu0 / self.s + gamma / self.s**2 + alpha / self.s**3)
+        if not np.isfinite(total).all():
+            raise ValueError(
+                "time must not be so short or long that its third power overflows, got times "
+                f"next to {self.duration:g} s"
+            )
+        growth = np.exp(self.shift * self.time)
+        frequency = np.fft.irfft(total, _SAMPLES)[: self.time.size] / self.step * growth
+        rounding = _ROUNDING * np.abs(total).sum() / (_SAMPLES * self.step) * growth
+        above = np.flatnonzero(np.abs(frequency) >= rounding)
+        return np.asarray(frequency), float(self.time[above[-1]])
