@@ -7,10 +7,11 @@ precision does not decide, a count is `BOUNDARY`, and a search raises an `Undeci
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numba
@@ -46,14 +47,25 @@ _uncompiled = Plain(inclusion, seconds=1.0)
 _BLOCK = 256
 
 
+@lru_cache(1)
+def _pool(process: int) -> ThreadPoolExecutor:
+    """Return the threads of a process: a fork has none of those that it was made with."""
+    return ThreadPoolExecutor(numba.config.NUMBA_NUM_THREADS)
+
+
 def in_threads(function: Callable[[Any], Any], items: Iterable[Any]) -> list[Any]:
     """Return what a compiled function makes of some items; Ctrl-C ends it."""
     # A single item goes to a thread too: compiled functions do not react to Ctrl-C.
-    pool = ThreadPoolExecutor(numba.config.NUMBA_NUM_THREADS)
+    futures = [_pool(os.getpid()).submit(function, item) for item in items]
     try:
-        return list(pool.map(function, items))
+        return [future.result() for future in futures]
+    except KeyboardInterrupt:
+        # What runs on keeps its threads to itself.
+        _pool.cache_clear()
+        raise
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+        for future in futures:
+            future.cancel()
 
 
 def blocks(size: int, block: int) -> list[slice]:

@@ -446,14 +446,14 @@ def stable_half_differences(loop: Loop) -> tuple[float, float]:
     if at_start != 0:
         raise ValueError(f"loop must be stable as it is, but unstable_roots gives {at_start}")
     finest = _FINEST_STEP * (abs(start) or mean)
+    arms = _Arms(here, (one, other), mean)
     edges = []
     for end in (-_FARTHEST_SHARE * mean, _FARTHEST_SHARE * mean):
         edge, step = start, end - start
         while edge != end and abs(step) > finest:
             x = edge + step
-            there = _moved(here, (one, other), mean, x)
-            if unstable_roots(there) == 0 and _no_root_crosses(
-                here, (one, other), mean, *sorted((edge, x))
+            if unstable_roots(arms.moved(here, x)) == 0 and arms.no_root_crosses(
+                *sorted((edge, x))
             ):
                 edge = x
             else:
@@ -462,54 +462,62 @@ def stable_half_differences(loop: Loop) -> tuple[float, float]:
     return edges[0], edges[1]
 
 
-def _moved(system: System, arms: tuple[Delay, Delay], mean: float, x: float) -> System:
-    """Return a system with the delays mean + x and mean - x for two of its own."""
-    moved = dict(zip(arms, map(Delay.new, (exact(mean + x), exact(mean - x))), strict=True))
+class _Arms:
+    """A system with two delays mean + x and mean - x, affine in each of them."""
 
-    def of(part: Sum) -> Sum:
-        return Sum(
-            {
-                (Lag.of({moved.get(k, k): n for k, n in lag}), names): p
-                for (lag, names), p in part.terms.items()
-            }
-        )
+    def __init__(self, here: System, arms: tuple[Delay, Delay], mean: float) -> None:
+        self.arms, self.mean = arms, mean
+        self.d = here.numerator + here.denominator
+        self.point = np.array(list(here.nominal.values()))
+        parts = _by_powers(self.d, arms)
+        if set(parts) - {(0, 0), (1, 0), (0, 1), (1, 1)}:
+            raise ValueError(f"D must be affine in each of the two delays, got {here!r}")
+        d0, d1, d2, d12 = (parts.get(k, Sum({})) for k in ((0, 0), (1, 0), (0, 1), (1, 1)))
+        leads = [self.function(part).leading() for part in (d1, d2) if part]
+        # Up to the first power of s that delays act on, coefficients of D are affine in x.
+        self.most_order = 1 + min((lead.order for lead in leads if lead), default=0)
+        middle = Sum.of(polynomial([1]), Lag.after(exact(mean)))
+        both, apart = (d1 + d2) * middle, (d1 + -d2) * middle
+        names = [Sum.of(polynomial([1]), NOW, name) for name in ("both", "apart")]
+        whole = d0 + d12 * middle * middle + both * names[0] + apart * names[1]
+        nominal = {"both": 1.0, "apart": 0.0}
+        rest, plus, minus = Affine(System(whole, Sum({}), nominal), tuple(nominal)).terms
+        self.functions = [rest + plus, plus, minus * -1]
 
-    return System(of(system.numerator), of(system.denominator))
+    def moved(self, system: System, x: float) -> System:
+        """Return a system with its own two delays moved."""
+        lengths = exact(self.mean + x), exact(self.mean - x)
+        delays = dict(zip(self.arms, map(Delay.new, lengths), strict=True))
 
+        def of(part: Sum) -> Sum:
+            return Sum(
+                {
+                    (Lag.of({delays.get(k, k): n for k, n in lag}), names): p
+                    for (lag, names), p in part.terms.items()
+                }
+            )
 
-def _no_root_crosses(
-    here: System, arms: tuple[Delay, Delay], mean: float, low: float, high: float
-) -> bool:
-    """Tell whether no root crosses the axis at any half difference; False decides nothing."""
-    # What the mean, its sums with half differences and phases are rounded by.
-    low, high = low - 8.0 * EPSILON * mean, high + 8.0 * EPSILON * mean
-    d = here.numerator + here.denominator
-    parts = _by_powers(d, arms)
-    if set(parts) - {(0, 0), (1, 0), (0, 1), (1, 1)}:
-        raise ValueError(f"D must be affine in each of the two delays, got {here!r}")
-    d0, d1, d2, d12 = (parts.get(k, Sum({})) for k in ((0, 0), (1, 0), (0, 1), (1, 1)))
+        return System(of(system.numerator), of(system.denominator))
 
-    def of(part: Sum, x: float = 0.0) -> Function:
-        return Affine(_moved(System(part, Sum({})), arms, mean, x)).n[0]
+    def function(self, part: Sum, x: float = 0.0) -> Function:
+        """Return a sum with the two delays moved."""
+        return Affine(self.moved(System(part, Sum({})), x)).n[0]
 
-    a, b = of(d, low).leading(), of(d, high).leading()
-    arm_orders = [lead.order for part in (d1, d2) if part and (lead := of(part).leading())]
-    # Up to the first power of s that delays act on, coefficients of D are affine in x.
-    if a is None or b is None or not (a.order == b.order <= 1 + min(arm_orders, default=0)):
-        return False
-    if a.direction != b.direction:
-        return False
-    longest = max(of(d, low), of(d, high), key=lambda f: f.space.longest)
-    begin = longest.radius(a.order, min(abs(a.coefficient), abs(b.coefficient)), 0.25)
-    middle = Sum.of(polynomial([1]), Lag.after(exact(mean)))
-    both, apart = (d1 + d2) * middle, (d1 + -d2) * middle
-    names = [Sum.of(polynomial([1]), NOW, name) for name in ("both", "apart")]
-    whole = d0 + d12 * middle * middle + both * names[0] + apart * names[1]
-    affine = Affine(System(whole, Sum({}), {"both": 1.0, "apart": 0.0}), ("both", "apart"))
-    rest, plus, minus = affine.terms
-    # Past some frequency any phases may do.
-    free = (VERTEX, (1.0, -1.0, 0.0)), (TERM, (0.0, 0.5, 0.5)), (TERM, (0.0, 0.5, -0.5))
-    test = [(*member, (0.0, 0.0, 0.0)) for member in free]
-    arc = (0.0, low, 0.0, high), (0.0, 0.0, 0.0, 0.0)
-    with decided("not decided", np.array(list(here.nominal.values()))):
-        return decide.excludes(Family([rest + plus, plus, minus * -1], [test], arc), begin)
+    def no_root_crosses(self, low: float, high: float) -> bool:
+        """Tell whether no root crosses the axis in between; False decides nothing."""
+        # What the mean, its sums with half differences and phases are rounded by.
+        low, high = low - 8.0 * EPSILON * self.mean, high + 8.0 * EPSILON * self.mean
+        ends = [self.function(self.d, x) for x in (low, high)]
+        a, b = (end.leading() for end in ends)
+        if a is None or b is None or not (a.order == b.order <= self.most_order):
+            return False
+        if a.direction != b.direction:
+            return False
+        longest = max(ends, key=lambda f: f.space.longest)
+        begin = longest.radius(a.order, min(abs(a.coefficient), abs(b.coefficient)), 0.25)
+        # Past some frequency any phases may do.
+        free = (VERTEX, (1.0, -1.0, 0.0)), (TERM, (0.0, 0.5, 0.5)), (TERM, (0.0, 0.5, -0.5))
+        test = [(*member, (0.0, 0.0, 0.0)) for member in free]
+        arc = (0.0, low, 0.0, high), (0.0, 0.0, 0.0, 0.0)
+        with decided("not decided", self.point):
+            return decide.excludes(Family(self.functions, [test], arc), begin)
