@@ -252,7 +252,8 @@ class Simulation(Shown):
         In Hz, of all series that the run takes.
     tau1, tau2 : callable, optional
         Round-trip delays of arms that move, in place of the loop's own: functions that take an
-        array of times in s since the first sample, and return the delays in s.
+        array of times in s since the first sample, and return the delays in s. A table of
+        delays makes such a function: ``scipy.interpolate.CubicSpline(times, delays)``.
     limit : float, optional
         The run has diverged when the output exceeds the largest input so far by this factor.
 
