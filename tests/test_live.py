@@ -18,7 +18,16 @@ import pytest
 from matplotlib.pyplot import imread
 from scipy import signal
 
-from armlock import CommonArm, DualArm, first_crossing, margins, paper_loop, stability_chart
+from armlock import (
+    CommonArm,
+    DualArm,
+    critical_perturbation,
+    first_crossing,
+    flight_loop,
+    margins,
+    paper_loop,
+    stability_chart,
+)
 from armlock.orbits import esa
 from book._ext import year
 from tests.attack import to_loop
@@ -588,6 +597,8 @@ def table(page):
 
 
 WHITE_PAPER = "The white paper's loop"
+#: The directions of the table.
+WAYS = [(1, -1), (-1, 1), (1, 1), (-1, -1)]
 
 
 def test_a_point_is_held_until_it_is_released(opened):
@@ -711,7 +722,7 @@ def test_a_printed_controller_is_understood_or_refused(opened):
         )
         assert tab.get_by_label("Dead time in s").input_value() == "3"
     paste(page, DOUBTFUL[0])
-    assert "half a unit" in page.locator(".live-fields").inner_text()
+    assert "half a unit" in page.locator(".live-paste").inner_text()
     paste(page, "(s^3 + 1)/(s^2 + 0.1 s)")
     assert "3 zeros and 2 poles" in page.locator("[role=alert]").text_content()
 
@@ -812,6 +823,31 @@ def test_the_pictures_show_the_margins_of_the_table(opened):
     assert {"gain × 0.241", "gain × 4.27"} <= set(written)
 
 
+def test_the_root_that_crosses_is_named_and_drawn(opened):
+    page = opened()
+    for name, loop, way, times in (
+        # How often a root is there: z^2 and three poles, or z^4 and five zeros at 36.6 uHz.
+        (None, paper_loop(), (1, -1), "23"),
+        (WHITE_PAPER, flight_loop(), (1, 1), "45"),
+    ):
+        if name:
+            start(page, name)
+        found = table(page)
+        page.wait_for_timeout(300)
+        sizes = {w: critical_perturbation(loop, w) for w in WAYS}
+        assert min(WAYS, key=sizes.__getitem__) == way
+        cells = {w: found[f"along {w}".replace("-", "−")][0] for w in WAYS}
+        assert [w for w, cell in cells.items() if "(smallest)" in cell] == [way]
+        hertz = first_crossing(loop, {}, way).omega / (2 * np.pi)
+        digits, power = f"{hertz:.2e}".split("e")
+        number = f"{float(digits):g}\xa0×\xa010⁻{'⁰¹²³⁴⁵⁶⁷⁸⁹'[-int(power)]}"
+        assert f" at {number}\xa0Hz " in cells[way]
+        written = page.evaluate("drawn")
+        assert f"crosses at {number} Hz" in written
+        assert set(times) <= set(written)
+        assert number in said(page)
+
+
 #: Of the Nyquist curve, drawn anew: places where two long lines turn back, as at a spike.
 SPIKES = """async () => {
     const canvas = document.querySelectorAll('.live-main canvas')[2];
@@ -899,7 +935,7 @@ def test_a_frame_is_drawn_fast_enough_while_a_slider_moves(opened):
     assert (times[1] - times[0]) / 60 < 2.0 * (times[-1] - times[1]) / 30
 
 
-def test_numbers_in_the_fields_are_short(opened):
+def test_numbers_in_the_fields_are_short(opened, capsys):
     page = opened()
     assert page.get_by_label("Corner p in Hz").input_value() == "0.4"
     assert (
@@ -913,6 +949,11 @@ def test_numbers_in_the_fields_are_short(opened):
         scopes.append({})
         exec(code.text_content(), scopes[-1])
         assert scopes[-1]["controller"] == paper_loop().controller
+        printed = capsys.readouterr().out
+        assert re.search(r"unstable roots: 0\nrightmost root: -3\.57\S* rad/s\n", printed)
+        assert f"phase margin: {np.degrees(margins(paper_loop()).phase):.4g} degrees" in printed
+        assert "delay margin: 0 s\n" in printed
+        assert "critical perturbation along (1, -1): 1.46" in printed
 
 
 def test_errors_stand_at_the_field_that_was_edited(opened):
@@ -1120,7 +1161,11 @@ def test_files_and_prints_show_all_pictures_with_their_legend(opened, tmp_path):
     assert picture.shape[2] == 3 or (picture[..., 3] == 1.0).all()
     # From the chart, the s-plane, the Nyquist and the Bode plot, and a caption.
     shown = {"stable", "undecided", "in Hz", "10²", "phase in °", "frequency in Hz"}
-    assert {*shown, "Nyquist curve of L, compressed beyond 1"} <= set(page.evaluate("drawn"))
+    written = page.evaluate("drawn")
+    assert {*shown, "Nyquist curve of L, compressed beyond 1"} <= set(written)
+    # What they are of.
+    assert any("K(s) = 5000 s²" in line for line in written)
+    assert {"Phase margin in degrees", "36 at 3.48\xa0×\xa010⁻⁶\xa0Hz"} <= set(written)
     page.evaluate(
         """() => { drawn.length = 0; addEventListener('beforeprint', () => {
             window.printed = [...document.querySelectorAll('.live-main canvas')]
@@ -1175,7 +1220,21 @@ def test_fingers_scroll_past_drag_and_zoom(opened):
     x, y = place(page, 0.3, 0.7)
     at = page.evaluate("scrollY")
     drag(page, [(x, y)], [(x, y - 200)])
+    before = view()
     page.wait_for_function("at => scrollY > at + 50", arg=at)
+    x, y = place(page, 0.3, 0.7)
+    drag(page, [(x, y)], [(x + 30, y - 200)])
+    assert view() == before
+    # No key that a telephone lacks, and one word for what an unstable loop has none of.
+    hold(page, 0.4, 0.4)
+    assert "Held: a tap on it releases it." in said(page)
+    type_in(page, "Gain", "-5000")
+    table(page)
+    panel = page.locator(".live-summary strong").all_inner_texts()
+    assert panel.count("–") == 5
+    # What is pasted stands above the chart, near the numbers.
+    texts = page.get_by_label(PASTE).bounding_box()
+    assert texts["y"] < page.locator(CHART).bounding_box()["y"]
 
 
 @pytest.fixture
@@ -1202,13 +1261,35 @@ def test_the_year_takes_the_loop_of_the_page(opened, year_page):
     assert "Dashed: the half difference" in tab.locator("figcaption").first.inner_text()
 
 
+#: Whether a picture of a year is shaded at some days, of which only day 100 was counted.
+SHADED = """() => {
+    const canvas = document.createElement('canvas'), pen = canvas.getContext('2d');
+    [canvas.width, canvas.height] = [796, 400];
+    const values = Array.from({ length: 366 }, (_, t) => [1e-3 * Math.sin(t), 1e-3]);
+    const days = Array(366);
+    days[100] = null;
+    const colours = { mark: '#f00', text: '#000', line: '#00f', grid: '#ccc' };
+    armlockDraw.drawYear({ values, days, day: 300 }, pen, 796, 400, colours);
+    return [95, 98, 100, 102, 105].map(t =>
+        pen.getImageData(Math.round(56 + 732 * t / 365), 6, 1, 1).data[3] > 0); }"""
+
+
+def test_only_counted_days_are_shaded(year_page):
+    assert year_page().evaluate(SHADED) == [False, False, True, False, False]
+
+
 def test_the_year_marks_the_days_on_which_the_package_finds_no_stable_loop(year_page):
     tab = year_page()
-    for k, name in enumerate(("the paper's", "trailing", "2", "a month's start")):
-        tab.locator("select").nth(k).select_option(name)
+    # The loop that the page's first sentence names.
+    assert tab.locator("select").first.input_value() == "the paper's"
     words = tab.locator("p", has_text="counted once a day")
     words.wait_for()
-    told = re.findall(r"(\d+)(?: to (\d+))?", words.inner_text().split(".")[0])
+    assert words.inner_text().startswith("Stable on 160 of 366 days: 12 to 171.")
+    for k, name in enumerate(("the paper's", "trailing", "2", "a month's start")):
+        tab.locator("select").nth(k).select_option(name)
+    tab.locator("p", has_text="Counting the days").wait_for()
+    words.wait_for()
+    told = re.findall(r"(\d+)(?: to (\d+))?", words.inner_text().split(".")[0].split(":")[1])
     shown = {day for low, high in told for day in range(int(low), int(high or low) + 1)}
     orbit, days = esa("trailing"), np.arange(366.0)
     month = 365.25 / 12
@@ -1221,7 +1302,7 @@ def test_the_year_marks_the_days_on_which_the_package_finds_no_stable_loop(year_
     clear = np.abs(np.log(np.abs(ratio)[:, None] / [low, high])).min(axis=1) > 1e-3
     expected = (ratio < low) | (ratio > high)
     assert expected[clear].any()
-    assert [d for d in np.flatnonzero(clear) if (d in shown) != expected[d]] == []
+    assert [d for d in np.flatnonzero(clear) if (d in shown) == expected[d]] == []
     day = int(slide(tab, "Day", 0.3).input_value())
     assert day != 20
     one, two = (tau[day] for tau in now)

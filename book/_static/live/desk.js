@@ -13,7 +13,7 @@ const armlockDesk = (function () {
 
   /* Runs in a worker: `api` is what the engine's files give. */
   function tasks(api, TOO_MANY) {
-    const { UNCONFINED, UNDECIDED, make, tail, at, Disc } = api, WAYS = [[1, -1], [-1, 1], [1, 1], [-1, -1]];
+    const { UNCONFINED, UNDECIDED, make, tail, at, Disc } = api;
     // Steps of a count for a reader who waits, and for one who moves the pointer.
     const MOST = 4000000, QUICK = 400000, A_RADIAN = 1.2;
 
@@ -40,7 +40,7 @@ const armlockDesk = (function () {
       return known.get(name);
     }
     const begun = (...all) => Math.max(UNDECIDED, counted(...all));
-    const first = (spec, k) => api.firstBreak(make(spec), ...WAYS[k], begun(spec, 1, 1));
+    const first = (spec, way) => api.firstBreak(make(spec), ...way, begun(spec, 1, 1));
 
     const look = {
       chart: (spec, x0, x1, y0, y1, n, samples) => ({ n, box: { x0, x1, y0, y1 },
@@ -50,13 +50,12 @@ const armlockDesk = (function () {
       root: (spec, c1, c2) => counted(spec, c1, c2) < 0 ? null : api.rightmost(spec, c1, c2),
       break: first,
       margins: (spec, c1, c2) => api.margins(spec, c1, c2, begun(spec, c1, c2)),
-      // Of one day of a year: the critical perturbation of the arms in opposite directions, null where
-      // the loop is unstable. Without `whole` only whether it is.
+      // Of one day of a year: the critical perturbation of the arms in opposite directions if it is asked for, nan if
+      // not; null where the loop is unstable, and a word where that is undecided.
       day: (spec, whole) => {
-        const count = api.count(make(spec), 1, 1);
-        if (count > 0 || count === UNCONFINED) return null;
-        const found = whole || count ? [0, 1].map(k => first(spec, k)) : [NaN];
-        return found.includes(null) ? null : Math.min(...found);
+        const count = counted(spec, 1, 1);
+        if (count) return count > 0 || count === UNCONFINED ? null : "undecided";
+        return whole ? Math.min(...[[1, -1], [-1, 1]].map(way => first(spec, way).size)) : NaN;
       },
     };
     return ({ data: { kind, input } }) => {

@@ -1,7 +1,7 @@
 "use strict";
 /*
- * What the live pages draw: the chart over (c1, c2) with the D-curve, the Nyquist curve, Bode's plot,
- * poles and zeros, and a year. Plain canvases, because charts of many thousand points have to follow
+ * What the live pages draw: the chart over (c1, c2) with the D-curve, the Nyquist curve, Bode's plot, and
+ * a year. Plain canvases, because charts of many thousand points have to follow
  * the pointer in every frame.
  */
 const armlockDraw = (function () {
@@ -99,26 +99,6 @@ const armlockDraw = (function () {
     }
   }
 
-  /* Pictures as one file, 1600 pixels wide: with their captions, as they stand on the page, on its ground. */
-  function snapshot(sheets, done) {
-    const found = sheets.flatMap(sheet => [sheet.canvas, sheet.canvas.parentElement.querySelector("figcaption")]
-      .map(one => ({ sheet, one, box: one.getBoundingClientRect() })));
-    const [left, top] = ["left", "top"].map(side => Math.min(...found.map(({ box }) => box[side])));
-    const [right, bottom] = ["right", "bottom"].map(side => Math.max(...found.map(({ box }) => box[side])));
-    const scale = 1600 / (right - left), colours = palette();
-    const all = element("canvas", { width: 1600, height: Math.round(scale * (bottom - top)) }), pen = all.getContext("2d");
-    pen.fillStyle = colours.ground;
-    pen.fillRect(0, 0, all.width, all.height);
-    pen.fillStyle = colours.text;
-    pen.font = `${13 * scale}px sans-serif`;
-    for (const { sheet, one, box } of found) {
-      const copy = element("canvas"), at = [scale * (box.left - left), scale * (box.top - top)];
-      if (one !== sheet.canvas) pen.fillText(one.textContent, at[0], at[1] + 14 * scale, scale * box.width);
-      else { sheet.render(copy, scale); pen.drawImage(copy, ...at); }
-    }
-    all.toBlob(done);
-  }
-
   function ticks(low, high, most) {
     const rough = (high - low) / most, power = 10 ** Math.floor(Math.log10(rough));
     const step = [1, 2, 5, 10].map(k => k * power).find(k => k >= rough);
@@ -179,7 +159,7 @@ const armlockDraw = (function () {
    * a click or a tap holds the point, and Escape or another click on it releases it. */
   class Chart {
     constructor(label, { changed, pointed }) {
-      Object.assign(this, { changed, pointed, centre: [1, 1], half: 3, held: null, hover: null, broken: null,
+      Object.assign(this, { changed, pointed, centre: [1, 1], half: 3, held: null, hover: null, broken: [],
         grid: null, picture: null, curve: null, ghost: null, lit: null, stale: false, fingers: new Map() });
       this.sheet = new Sheet({ tabindex: 0, role: "application", "aria-label": `${label} Arrow keys `
         + "move the point, with shift by ten steps; plus and minus zoom; Escape releases the point." }, wide => wide + 40,
@@ -226,7 +206,8 @@ const armlockDraw = (function () {
     }
 
     clear() {
-      this.grid = this.picture = this.curve = this.broken = null;
+      this.grid = this.picture = this.curve = null;
+      this.broken = [];
       this.stale = false;
       this.sheet.draw();
     }
@@ -307,8 +288,8 @@ const armlockDraw = (function () {
         pen.lineTo(px(1) + dx, py(1) + dy);
       }
       pen.stroke();
-      if (this.broken > 0 && this.broken < Infinity)
-        dot(pen, px(1 + this.broken), py(1 - this.broken), 5, colours.text, colours.ground);
+      for (const { place: [x, y], weakest } of this.broken)
+        dot(pen, px(x), py(y), weakest ? 5 : 4, weakest ? colours.text : colours.ground, weakest ? colours.ground : colours.text);
       if (this.lit) dot(pen, px(this.lit[0]), py(this.lit[1]), 6, colours.mark, colours.ground);
       if (this.marked) ring(pen, px(this.marked[0]), py(this.marked[1]), this.held ? 8 : 5, colours);
       if (this.held) dot(pen, px(this.held[0]), py(this.held[1]), 3, colours.line);
@@ -349,7 +330,7 @@ const armlockDraw = (function () {
       pen.textBaseline = "middle";
       for (const [name, shades] of [["stable", [stable]], ["unstable, few to many roots", [few, many]],
         ["unstable at high frequency", [lost]], ["undecided", [...unsure, ...unsure]],
-        ["D-curve at the edge, low to high frequency", RAINBOW]]) {
+        [`D-curve at the edge${this.curve?.range[1] ? `, ${[...new Set(this.curve.range.map(w => say(w / TURN, 2)))].join(" to ")} Hz` : ""}`, RAINBOW]]) {
         const long = pen.measureText(name).width + 34, half = shades === RAINBOW ? 1.5 : 5;
         if (x + long > wide) [x, y] = [6, y + 17];
         shades.forEach((shade, k) => {
@@ -434,7 +415,7 @@ const armlockDraw = (function () {
       const [x, y] = this.sheet.place(event);
       this.canvas.setPointerCapture(event.pointerId);
       this.fingers.set(event.pointerId, [x, y]);
-      this.gripped = this.grip();
+      this.gripped = this.begun = this.grip();
       this.moved = this.fingers.size > 1;
       this.onPoint = this.held && !this.moved
         && Math.hypot(x - this.px(this.held[0]), y - this.py(this.held[1])) < (event.pointerType === "mouse" ? 10 : 24);
@@ -446,8 +427,14 @@ const armlockDraw = (function () {
         return;
       }
       this.fingers.set(event.pointerId, this.sheet.place(event));
-      const now = this.grip(), from = this.gripped, { frame } = this;
-      if (!this.moved && Math.hypot(now.x - from.x, now.y - from.y) < 4) return;
+      const now = this.grip(), { frame } = this;
+      if (!this.moved) {
+        // A finger that may go on to scroll the page does not move the view yet.
+        const across = Math.abs(now.x - this.gripped.x), down = Math.abs(now.y - this.gripped.y), swipe = event.pointerType === "touch" && !this.onPoint;
+        if (swipe ? across < 16 || across < down : Math.hypot(across, down) < 4) return;
+        if (swipe) this.gripped = now;
+      }
+      const from = this.gripped;
       this.moved = true;
       if (this.onPoint) {
         const found = this.at(event);
@@ -465,6 +452,8 @@ const armlockDraw = (function () {
     lift(event) {
       const tapped = this.fingers.delete(event.pointerId) && !this.moved && event.type === "pointerup";
       const found = tapped && this.at(event);
+      // The browser has taken the finger to scroll with: the view stays as it was.
+      if (event.type === "pointercancel" && this.moved && !this.onPoint) this.show(this.begun.centre, this.begun.half);
       if (found) this.hold(this.onPoint ? null : found);
       this.onPoint = false;
       this.canvas.style.cursor = "";
@@ -527,12 +516,14 @@ const armlockDraw = (function () {
     pen.stroke();
   }
 
-  /* What is pinned is thin and dashed. */
-  function ghost(pen, colours, draw) {
-    pen.strokeStyle = colours.text;
+  /* What is pinned is dashed, and a paler curve of its colour. */
+  function ghost(pen, colour, draw, alpha = 0.65) {
+    pen.strokeStyle = colour;
+    pen.globalAlpha = alpha;
     pen.setLineDash([4, 4]);
     draw();
     pen.setLineDash([]);
+    pen.globalAlpha = 1;
   }
 
   /* Lines at values beside a plot. */
@@ -659,7 +650,7 @@ const armlockDraw = (function () {
     curve(pen, half.length, i => [half[i][0], 2 * cy - half[i][1]]);
     pen.strokeStyle = colours.line;
     curve(pen, half.length, i => half[i]);
-    if (other) ghost(pen, colours, () => curve(pen, other.length, i => other[i]));
+    if (other) ghost(pen, colours.line, () => curve(pen, other.length, i => other[i]));
     const taken = [];
     named(taken);
     pen.strokeStyle = colours.mark;
@@ -729,7 +720,7 @@ const armlockDraw = (function () {
         if (part !== "phase" && now.band.length) for (const [x, y] of [...edge(1), ...edge(-1).reverse()]) pen.lineTo(x, y);
         pen.fill();
         pen.globalAlpha = 1;
-        if (shown[1]) ghost(pen, colours, () => trace(shown[1], part));
+        if (shown[1]) ghost(pen, colour, () => trace(shown[1], part));
         pen.strokeStyle = colour;
         trace(shown[0], part);
       }
@@ -770,7 +761,7 @@ const armlockDraw = (function () {
     }
     // The bound on |S|, and what is above it.
     if (now.bound) {
-      ghost(pen, colours, () => curve(pen, 2, k => [left + k * span, gain(now.bound)]));
+      ghost(pen, colours.text, () => curve(pen, 2, k => [left + k * span, gain(now.bound)]), 1);
       pen.textAlign = "right";
       labelBeside(pen, "bound", left + 0.7 * span, gain(now.bound) - 9, colours, taken, places);
       pen.strokeStyle = colours.mark;
@@ -805,47 +796,6 @@ const armlockDraw = (function () {
     return i => [px(omega[i]), null];
   }
 
-  /* Poles and zeros of the controller in the s-plane, the distance from 0 on a logarithmic scale.
-   * Returns where each is, and what root a place is. */
-  function drawRoots({ zeros, poles, unit, range }, pen, wide, high, colours) {
-    const cx = wide / 2, cy = high / 2, full = 0.46 * Math.min(wide, high), [least, most] = range;
-    const share = v => Math.min(Math.max(0.15 + 0.75 * Math.log(v / least) / Math.log(most / least), 0), 1);
-    const place = ([re, im]) => {
-      const size = Math.hypot(re, im), k = size ? full * share(size) / size : 0;
-      return [cx + k * re, cy - k * im];
-    };
-    const sizes = [], places = [...zeros, ...poles].map(place);
-    const every = Math.ceil(Math.log10(most / least) / 5);
-    for (let k = Math.ceil(Math.log10(least / unit)); 10 ** k <= 1.01 * most / unit; k += every) sizes.push(10 ** k);
-    pen.strokeStyle = colours.grid;
-    pen.beginPath();
-    pen.moveTo(cx, cy - full);
-    pen.lineTo(cx, cy + full);
-    pen.moveTo(cx - full, cy);
-    pen.lineTo(cx + full, cy);
-    pen.stroke();
-    if (sizes.length) rings(pen, [cx, cy], sizes, v => full * share(v * unit),
-      v => power(Math.round(Math.log10(v))), places, colours)([]);
-    pen.lineWidth = 2;
-    pen.strokeStyle = colours.line;
-    for (const root of zeros) {
-      pen.beginPath();
-      pen.arc(...place(root), 6, 0, 7);
-      pen.stroke();
-    }
-    pen.strokeStyle = colours.mark;
-    for (const root of poles) cross(pen, ...place(root));
-    pen.lineWidth = 1;
-    pen.textAlign = "left";
-    pen.textBaseline = "bottom";
-    pen.fillText(unit === 1 ? "in rad/s" : "in Hz", 4, high - 4);
-    return { place, root: (x, y) => {
-      const far = Math.hypot(x - cx, y - cy) / full, angle = Math.atan2(cy - y, x - cx);
-      const size = least * Math.exp((Math.max(far, 0.05) - 0.15) / 0.75 * Math.log(most / least));
-      return [size * Math.cos(angle), size * Math.sin(angle)];
-    } };
-  }
-
   /* A year: half differences above, true and assumed (dashed), and the critical perturbation below.
    * Days that were counted and are not stable are shaded in both. */
   function drawYear({ values, days, day }, pen, wide, high, colours) {
@@ -853,18 +803,16 @@ const armlockDraw = (function () {
     const px = t => left + span * t / last;
     const most = 1.1 * Math.max(...values.flat().map(Math.abs)) * 1e3, above = v => 8 + room * (most - v) / (2 * most);
     pen.fillStyle = colours.mark;
-    days.forEach((found, t) => {
-      if (found !== null) return;
-      // As far as to the days beside it that were counted.
-      let from = t - 1, to = t + 1;
-      while (from > 0 && days[from] === undefined) from--;
-      while (to < last && days[to] === undefined) to++;
+    for (let t = 0; t <= last; t++) if (days[t] === null) {
+      // Half a day to each side: what lies beside it may not be counted yet.
+      const from = px(Math.max(0, t - 0.5));
+      while (days[t + 1] === null) t++;
+      const long = px(Math.min(last, t + 0.5)) - from;
       pen.globalAlpha = 0.3;
-      for (const y of [8, 26 + room])
-        pen.fillRect(px(0.5 * (from + t)), y, px(0.5 * (to + t)) - px(0.5 * (from + t)), room);
+      for (const y of [8, 26 + room]) pen.fillRect(from, y, long, room);
       pen.globalAlpha = 1;
-      pen.fillRect(px(0.5 * (from + t)), 4, px(0.5 * (to + t)) - px(0.5 * (from + t)), 4);
-    });
+      pen.fillRect(from, 4, long, 4);
+    }
     pen.fillStyle = colours.text;
     lines(pen, ticks(-most, most, 5), v => say(+v.toPrecision(6)), above, left, wide - right, colours);
     upright(pen, "half difference in ms", 2, 8 + room / 2);
@@ -872,7 +820,7 @@ const armlockDraw = (function () {
     pen.lineWidth = 2;
     curve(pen, values.length, t => [px(t), above(1e3 * values[t][0])]);
     pen.lineWidth = 1;
-    ghost(pen, colours, () => curve(pen, values.length, t => [px(t), above(1e3 * values[t][1])]));
+    ghost(pen, colours.text, () => curve(pen, values.length, t => [px(t), above(1e3 * values[t][1])]), 1);
     const found = days.map((v, t) => [t, v]).filter(([, v]) => v > 0 && v < Infinity);
     // The paper's perturbation is always in sight.
     const sizes = found.map(([, v]) => Math.log10(v)), first = Math.floor(Math.min(-7, ...sizes));
@@ -881,7 +829,7 @@ const armlockDraw = (function () {
     lines(pen, Array.from({ length: Math.floor(top - first) + 1 }, (_, k) => 10 ** (first + k)),
       v => power(Math.round(Math.log10(v))), below, left, wide - right, colours);
     upright(pen, "critical, along \u00b1(1, \u22121)", 2, 26 + 1.5 * room);
-    ghost(pen, colours, () => curve(pen, 2, k => [left + k * span, below(SQUARE)]));
+    ghost(pen, colours.text, () => curve(pen, 2, k => [left + k * span, below(SQUARE)]));
     pen.textAlign = "right";
     pen.textBaseline = "bottom";
     pen.fillText(`the paper\u2019s ${power(-6)}`, wide - right - 4, below(SQUARE) - 2);
@@ -901,5 +849,5 @@ const armlockDraw = (function () {
     pen.fillText("day", left + span / 2, high - 2);
   }
 
-  return { element, nearest, snapshot, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear };
+  return { element, nearest, palette, Sheet, Chart, rings, labelBeside, cross, drawNyquist, drawBode, drawYear };
 })();

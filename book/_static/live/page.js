@@ -3,12 +3,12 @@
  * The live pages: a form, a chart of the stable region that answers the pointer, plots that follow.
  *
  * A page loads this file. It loads those beside it, each with one job: loop.js counts, margins.js
- * and chart.js certify, read.js reads, text.js writes, draw.js draws, desk.js has the workers, and table.js the
- * numbers.
+ * and chart.js certify, read.js reads, text.js writes, draw.js and plane.js draw, export.js writes
+ * pictures, desk.js has the workers, and table.js the numbers.
  */
 (function () {
   const here = document.currentScript.src;
-  const files = ["loop.js", "margins.js", "chart.js", "curves.js", "read.js", "text.js", "draw.js", "desk.js", "table.js",
+  const files = ["loop.js", "margins.js", "chart.js", "curves.js", "read.js", "text.js", "draw.js", "plane.js", "export.js", "desk.js", "table.js",
     ...document.querySelector("[data-live=year]") ? ["orbits.js"] : []];
   const missing = files.filter(name =>
     !Array.from(document.scripts).some(script => script.src.endsWith(`/live/${name}`)));
@@ -27,10 +27,11 @@
 })();
 
 function armlockPages() {
-  const { TURN, say, duration, time, shortest, exact, written, formula, python, address, fromAddress } = armlockText;
+  const { TURN, say, duration, time, shortest, exact, written, formula, described, python, address, fromAddress } = armlockText;
   const { readRoots, readController, readNumber } = armlockRead;
-  const { element, nearest, snapshot, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear } = armlockDraw;
-  const { Desk } = armlockDesk, { LOST, TOLD, WAYS, UNTOLD, UNBROKEN, counted, rootText, partsOf, complete, fill, fillPanel, copied } = armlockTable;
+  const { element, nearest, Sheet, Chart, drawNyquist, drawBode, drawYear } = armlockDraw;
+  const { drawRoots } = armlockPlane, { snapshot } = armlockExport;
+  const { Desk } = armlockDesk, { LOST, TOLD, WAYS, UNTOLD, UNBROKEN, weakestOf, weakestText, counted, rootText, partsOf, complete, fill, fillPanel, copied } = armlockTable;
   const api = armlockLoop();
   Object.assign(api, armlockChart(api), armlockCurves(api));
 
@@ -117,8 +118,8 @@ function armlockPages() {
       this.design = this.pinned = null;
       // What a page does besides where the view, the held "point", the "pin" or the "loop" is another.
       this.moved = () => {};
-      // What it does where a loop is pinned, or none.
-      this.compared = () => {};
+      // What it does where a loop is pinned, or none, and where a number is there.
+      this.compared = this.heard = () => {};
       this.plots = [
         this.plot("Nyquist curve of L, compressed beyond 1", drawNyquist, wide => wide),
         this.plot("Bode\u2019s plot of L, and the sensitivity S = 1/(1 + L)", drawBode, wide => 0.9 * wide),
@@ -211,7 +212,7 @@ function armlockPages() {
     set(spec, moving = false) {
       this.slow.drop(...TOLD, ...BREAKS);
       this.design = { spec, loop: api.make(spec), kept: {}, told: {}, breaks: Array(WAYS.length).fill(undefined), asked: false };
-      this.chart.broken = null;
+      this.chart.broken = [];
       this.lit = this.chart.lit = null;
       this.redraw(moving);
       this.tell(moving);
@@ -304,7 +305,8 @@ function armlockPages() {
       const parts = [`${this.name}: ${count === undefined ? "counting \u2026" : counted(count)}`];
       if (count >= 0 && Number.isFinite(root?.[0])) parts.push(`rightmost root in rad/s: ${rootText(root)}; it `
         + `${root[0] < 0 ? "decays" : "grows"} by a factor of e in ${duration(1 / Math.abs(root[0]))}`);
-      this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape or a click on it releases it." : ""}`;
+      const release = matchMedia("(pointer: coarse)").matches ? "a tap on it releases it" : "Escape or a click on it releases it";
+      this.out.textContent = `${parts.join("; ")}.${this.chart.held ? ` Held: ${release}.` : this.chart.hover ? "" : ` ${weakestText(this.design.breaks)}`}`;
       this.list();
     }
 
@@ -316,7 +318,10 @@ function armlockPages() {
         this.respond();
       }
       this.asks(this.slow, design, told, point, () => {
-        this.chart.broken = design.breaks[0]?.size;
+        const weakest = weakestOf(design.breaks);
+        this.chart.broken = design.breaks.flatMap((one, k) => one?.size > 0 && one.size < Infinity
+          ? [{ place: WAYS[k].map(v => 1 + v * one.size), weakest: one.size === weakest?.size }] : []);
+        this.heard();
         // A margin may lie beyond what is drawn.
         if (told === this.design?.told) this.respond(); else this.draw();
         this.write();
@@ -331,7 +336,7 @@ function armlockPages() {
       });
       if (design.asked) return;
       design.asked = true;
-      BREAKS.forEach((kind, k) => desk.ask(kind, [design.spec, k], (found, error) => {
+      BREAKS.forEach((kind, k) => desk.ask(kind, [design.spec, WAYS[k]], (found, error) => {
         design.breaks[k] = error ? UNBROKEN : found;
         heard(kind);
       }));
@@ -347,6 +352,12 @@ function armlockPages() {
       fill(this.numbers, parts, ["Number", "This loop", `Pinned at ${this.pinned?.at}`].slice(0, 1 + designs.length));
       this.ready.textContent = complete(parts) ? `The table has all numbers at ${this.name}: ${parts[0].slice(1)
         .map(([name, [{ text }]]) => `${name}: ${text}`).join("; ")}.` : "";
+    }
+
+    /* What a picture is of. */
+    get lines() {
+      const one = ({ spec }, title = "") => `${title}${formula(spec)}. ${described(spec)}`;
+      return this.design ? [one(this.design), ...this.pinned ? [one(this.pinned, `Dashed, pinned at ${this.pinned.at}: `)] : []] : [];
     }
 
     /* The table as plain text. */
@@ -428,7 +439,7 @@ function armlockPages() {
     const pin = element("button", { type: "button", "aria-pressed": "false", onclick: () => live.pin() }, "Pin this loop");
     live.compared = pinned => pin.setAttribute("aria-pressed", String(pinned));
     return buttons(button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
-      ...more, pin, button("PNG", () => snapshot(sheets, blob => {
+      ...more, pin, button("PNG", () => snapshot(sheets, live.lines, live.numbers, blob => {
         const link = element("a", { href: URL.createObjectURL(blob), download: `${file}.png` });
         link.click();
         setTimeout(() => URL.revokeObjectURL(link.href), 1000);
@@ -439,7 +450,7 @@ function armlockPages() {
     return element("p", { class: "live-note" }, "Move over the chart for a preview. A click or a tap holds the point. "
       + "On the D-curve a root lies on the imaginary axis, from low frequency (blue) to high (yellow), or is 0 (straight line). "
       + "It is drawn where it bounds the stable region. "
-      + "Cross: the ideal point (1, 1). Dot: the critical perturbation along (1, \u22121). Square, in small charts: "
+      + "Cross: the ideal point (1, 1). Dots: the critical perturbations along four directions, the smallest one filled. Square, in small charts: "
       + `the paper\u2019s perturbations, up to 10\u207b\u2076. Dashed curves: the pinned loop.${more}`);
   }
 
@@ -606,7 +617,7 @@ function armlockPages() {
           gain.to(0);
           dead.to(Math.max(least, Math.log10(spec.delay)), time(spec.delay));
           const root = [...spec.zeros, ...spec.poles].map(v => Math.hypot(...v)).filter(v => v);
-          range = [Math.min(...root, 1 / spec.tau1), Math.max(...root, 1 / spec.tau1)];
+          range = [Math.min(...root, 1 / spec.tau1), Math.max(...root, 30 / spec.tau1)];
           if (range[1] < 100 * range[0]) range = [range[0] / 10, range[1] * 10];
         }
         if (edited && !["unit", "bound"].includes(edited)) presets.value = "";
@@ -718,7 +729,7 @@ function armlockPages() {
     const roots = new Sheet({ role: "img", "aria-label": "Roots of the controller in the s-plane. The fields Zeros "
       + "and Poles have them as text." }, wide => 0.8 * wide, (pen, wide, high, colours) => {
       const { spec } = live;
-      drawn = spec && drawRoots({ ...spec, unit, range }, pen, wide, high, colours);
+      drawn = spec && drawRoots({ ...spec, unit, range, crossing: weakestOf(live.design.breaks)?.omega, rightmost: live.design.told.root }, pen, wide, high, colours);
     });
     const near = event => {
       if (!drawn) return null;
@@ -756,7 +767,8 @@ function armlockPages() {
     on("touchstart", event => { if (caught) event.preventDefault(); });
 
     const [nyquist, bode] = live.plots, plane = element("figure", { class: "live-plane" },
-      element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb) of the controller"), roots.canvas);
+      element("figcaption", {}, "Poles \u00d7 and zeros \u25cb of the controller: drag them"), roots.canvas);
+    live.heard = () => roots.draw();
     bode.figure.classList.add("live-bode");
     place.replaceChildren(element("div", { class: "live-own" },
       element("div", { class: "live-main" }, figures(live.figure, plane, nyquist.figure, bode.figure), live.following,
@@ -764,7 +776,7 @@ function armlockPages() {
           button("Whole", () => live.chart.show([0, 0], 3)), button("Copy numbers", () => live.copy())), live.note, live.numbers),
       element("div", { class: "live-side" }, element("div", { class: "live-top" }, preset, wrong),
         element("div", { class: "live-panel" }, live.summary, gain, dead),
-        element("div", { class: "live-fields" }, paste, understood, doubt, inputs, legend(" Shaded disc around \u22121 in the Nyquist "
+        element("div", { class: "live-paste" }, paste, understood, doubt), element("div", { class: "live-fields" }, inputs, legend(" In the s-plane: poles and zeros of the controller, the closed-loop root that crosses at the smallest critical perturbation, and the rightmost root. Shaded disc around \u22121 in the Nyquist "
           + "plot, and dashed line in Bode\u2019s plot: the bound on |S|."), element("p", {}, orbit)))),
     element("details", {}, element("summary", {}, "This loop in Python"), code));
 
@@ -824,7 +836,7 @@ function armlockPages() {
   }
 
   function year(place) {
-    const LOOPS = { "the white paper's": [FLIGHT, 6e-3], "the paper's": [PAPER, 1.5e-6] };
+    const LOOPS = { "the paper's": [PAPER, 1.5e-6], "the white paper's": [FLIGHT, 6e-3] };
     const wrong = element("p", { class: "live-note live-wrong", role: "alert" }), MINE = "yours, from the link";
     // "Your own loop" opens this page with its loop in the address.
     try {
@@ -839,7 +851,7 @@ function armlockPages() {
     const live = new Live("Number of unstable roots over c1 and c2 on this day.");
     const state = { loop: LOOPS[MINE] ? MINE : Object.keys(LOOPS)[0], orbit: Object.keys(armlockOrbits)[0], master: "1",
       hold: HOLDS[0], day: 20 };
-    // Of each day that was counted: where the loop breaks, null where it is not stable.
+    // Of each day that was counted what `day` in desk.js tells.
     let days = [], trips = null, half = null, values = [], finished = 0;
     const back = element("a", {}, "Open the loop of this day in \u201cYour own loop\u201d");
     const words = element("p", { class: "live-note", role: "status" });
@@ -869,7 +881,10 @@ function armlockPages() {
           // A sensor that would divide by zero is no loop, and so not a stable one.
           days[day] = error ? null : found;
           sheet.draw();
-          if (++finished > YEAR) summary(); else next(desk);
+          if (++finished > YEAR) summary(); else {
+            lost.textContent = `Counting the days: ${finished} of ${YEAR + 1} \u2026`;
+            next(desk);
+          }
         });
       };
       for (const desk of [live.slow, live.wide]) {
@@ -878,16 +893,21 @@ function armlockPages() {
       }
     };
     const summary = () => {
-      const parts = [];
-      for (let day = 0; day <= YEAR; day++) if (days[day] === null) {
-        const from = day;
-        while (days[day + 1] === null) day++;
-        parts.push(from === day ? `${day}` : `${from} to ${day}`);
-      }
-      lost.textContent = parts.length ? `Unstable on days ${parts.join(", ")}.`
-        : "Stable on every day of the year.";
-      lost.textContent += " The roots are counted once a day, so that shorter changes are not seen. The critical "
-        + "perturbation is computed every eighth day. A dot is missing where it is undecided, 0, or larger than 2.";
+      const listed = is => {
+        const parts = [];
+        for (let day = 0; day <= YEAR; day++) if (is(days[day])) {
+          const from = day;
+          while (day < YEAR && is(days[day + 1])) day++;
+          parts.push(from === day ? `${day}` : `${from} to ${day}`);
+        }
+        return parts.join(", ");
+      };
+      const stable = found => typeof found === "number", open = found => found === "undecided", number = days.filter(stable).length;
+      lost.textContent = number > YEAR ? `Stable on all ${YEAR + 1} days.` : number ? `Stable on ${number} of ${YEAR + 1} days: ${listed(stable)}.`
+        : `Stable on none of ${YEAR + 1} days.`;
+      if (days.some(open)) lost.textContent += ` Undecided: ${listed(open)}.`;
+      lost.textContent += " The roots are counted once a day. Dots: the critical perturbation along (1, \u22121) or (\u22121, 1), whichever is smaller, every "
+        + "eighth day; none where it is undecided, 0, or larger than 2.";
     };
     const lost = element("p", { class: "live-note", role: "status" });
     const move = (day, moving) => {
@@ -904,7 +924,7 @@ function armlockPages() {
       trips = arms(state.orbit, state.master);
       half = t => 0.5 * (trips[0](t) - trips[1](t));
       values = Array.from({ length: YEAR + 1 }, (_, day) => [half(day), held(half, state.hold, day)]);
-      lost.textContent = "Counting the days \u2026";
+      lost.textContent = `Counting the days: 0 of ${YEAR + 1} \u2026`;
       live.chart.show([1, 1], LOOPS[state.loop][1]);
       move(state.day, false);
       count();
@@ -921,19 +941,21 @@ function armlockPages() {
       (v, moving) => move(v, moving));
     today.classList.add("live-wide");
     today.querySelector("input").step = 1;
-    const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
+    const form = element("form", { class: "live-form live-single", onsubmit: event => event.preventDefault() },
       pick("loop", "Loop", Object.keys(LOOPS)), pick("orbit", "Orbit", Object.keys(armlockOrbits)),
       pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor assumes", HOLDS));
     place.replaceChildren(element("div", { class: "live-own" },
       element("div", { class: "live-main" }, figures(element("figure", {}, element("figcaption", {}, "Solid: the true half "
-        + "difference. Dashed: the half difference that the sensor assumes. Dots: the critical perturbation along (1, \u22121) or "
-        + "(\u22121, 1), whichever is smaller."), sheet.canvas), live.figure), words, lost, live.note, live.numbers, buttons(back)),
+        + "difference. Dashed: the half difference that the sensor assumes."), sheet.canvas, lost), live.figure), words, live.note, live.numbers, buttons(back)),
       element("div", { class: "live-side" }, element("div", { class: "live-top" }, form, wrong),
         element("div", { class: "live-panel" }, live.summary, today), element("div", { class: "live-fields" }, legend()))));
     addEventListener("hashchange", () => location.reload());
     update();
   }
 
+  // On a wide screen the book's own column begins closed beside a page that is all live: its button opens it.
+  if (innerWidth >= 992 && document.querySelector("[data-live=loop], [data-live=year]"))
+    document.querySelector("#pst-primary-sidebar")?.classList.add("pst-sidebar-hidden");
   for (const place of document.querySelectorAll("[data-live]"))
     ({ front, loop: own, year }[place.dataset.live] || chapter)(place);
 }

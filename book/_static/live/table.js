@@ -11,7 +11,8 @@ const armlockTable = (function () {
     [TOO_MANY]: "undecided: too many roots to count" };
   const SHORT = { ...WORDS, [UNCONFINED]: "infinitely many", [BOUNDARY]: "one on the axis", [TOO_MANY]: "too many to count" };
   // What is asked for of a loop at its point, and of a loop from (1, 1).
-  const TOLD = ["count", "margins", "root"], WAYS = ["(1, \u22121)", "(\u22121, 1)", "(1, 1)", "(\u22121, \u22121)"];
+  const TOLD = ["count", "margins", "root"];
+  const WAYS = [[1, -1], [-1, 1], [1, 1], [-1, -1]], named = way => `(${way.join(", ").replace(/-/g, "\u2212")})`;
   const UNTOLD = { count: UNDECIDED, root: null, margins: { delay: NaN, lower: NaN, upper: NaN, phase: NaN, modulus: NaN } };
   const UNBROKEN = { size: NaN };
   const MARGINS = ["Delay margin", "Unstable roots", "Phase margin in degrees", "Smallest gain factor of a stable loop",
@@ -54,9 +55,27 @@ const armlockTable = (function () {
     return count < 0 ? plain(WORDS[count]) : root === undefined ? WAIT : plain(root ? rootText(root) : "undecided");
   }
 
+  /* The smallest critical perturbation of the directions, once all are known: `way`, `size` and `omega`. */
+  function weakestOf(breaks) {
+    if (!breaks.every(one => one?.size >= 0)) return null;
+    const size = Math.min(...breaks.map(one => one.size)), k = breaks.findIndex(one => one.size === size);
+    return { way: WAYS[k], ...breaks[k] };
+  }
+
+  /* The same in a sentence. */
+  function weakestText(breaks) {
+    const found = weakestOf(breaks);
+    if (!found) return "";
+    const { size, omega, way } = found;
+    if (size === Infinity) return "None of the four directions of the table has a critical perturbation up to 2.";
+    if (size === 0) return `No perturbation along ${named(way)} is tolerated.`;
+    return `The smallest of the four critical perturbations is ${say(size)} along ${named(way)}${omega === Infinity ? ", in the limit of high frequency"
+      : omega ? `, where a root crosses at ${say(omega / TURN)}\u00a0Hz` : ", where a root is at s = 0"}.`;
+  }
+
   /* The critical perturbations, each with the frequency of the root that crosses there. */
   function breaksOf({ breaks }) {
-    const sizes = breaks.map(one => one?.size), weakest = Math.min(...sizes);
+    const weakest = weakestOf(breaks);
     return WAYS.map((_, k) => {
       const found = breaks[k];
       if (found === undefined) return WAIT;
@@ -65,7 +84,7 @@ const armlockTable = (function () {
       if (size === 0) return plain("0: none is tolerated");
       const cell = met(size, omega, Infinity, ["none up to 2"]);
       if (omega === 0 && size < Infinity) cell.text += " at s\u00a0=\u00a00";
-      if (size === weakest && size < Infinity) cell.text += " (smallest of the four)";
+      if (size === weakest?.size && size < Infinity) cell.text += " (smallest)";
       return cell;
     });
   }
@@ -77,7 +96,7 @@ const armlockTable = (function () {
     return [
       [`At ${name}`, ...rows(MARGINS, margins), ["Rightmost root in rad/s", designs.map(rightmost)]],
       ["Critical perturbation from (1, 1): |c1 \u2212 1| = |c2 \u2212 1|, and the frequency of the root that crosses",
-        ...rows(WAYS.map(way => `along ${way}`), breaks)],
+        ...rows(WAYS.map(way => `along ${named(way)}`), breaks)],
     ];
   }
 
@@ -110,5 +129,5 @@ const armlockTable = (function () {
   /* A table as plain text. */
   const copied = table => Array.from(table.rows, row => Array.from(row.cells, cell => cell.textContent).join("\t")).join("\n");
 
-  return { LOST, TOLD, WAYS, UNTOLD, UNBROKEN, counted, rootText, partsOf, complete, fill, fillPanel, copied };
+  return { LOST, TOLD, WAYS, UNTOLD, UNBROKEN, weakestOf, weakestText, counted, rootText, partsOf, complete, fill, fillPanel, copied };
 })();

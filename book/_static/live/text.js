@@ -88,6 +88,13 @@ const armlockText = (function () {
     return `K(s) = ${above}${poles.length ? ` / ${product(poles)}` : ""}`;
   }
 
+  /* What a loop is beside its controller. */
+  function described({ sensor, tau1, tau2, delay, corner, difference }) {
+    const two = ["dual", "modified"].includes(sensor);
+    return `Sensor: ${sensor}${two ? `, with corner ${say(corner / TURN)} Hz and \u0394\u03c4 = ${say(difference, 6)} s` : ""}. Delays ${say(tau1, 8)} s and ${
+      say(tau2, 8)} s${delay ? `, dead time ${time(delay)}` : ""}.`;
+  }
+
   /* The lines that make the same loop with the package. */
   function python(spec, [c1, c2], unit) {
     const times = text => unit === 1 || text === "0" ? text : `${text} * hertz`;
@@ -100,15 +107,21 @@ const armlockText = (function () {
         + `${Number((0.5 * (spec.tau1 + spec.tau2)).toPrecision(15))}, half_difference=${spec.difference / 2}, corner=${corner()}\n    )`],
     };
     const [name, sensor] = (sensors[spec.sensor] || (() => Array(2).fill(spec.sensor.toUpperCase())))();
-    return [...unit === 1 ? [] : ["from math import pi", ""],
+    return [`from math import degrees${unit === 1 ? "" : ", pi"}`, "",
       "from armlock import Controller, Loop, critical_perturbation, margins, rightmost_root, unstable_roots", `from armlock.sensors import ${name}`,
       "", ...unit === 1 ? [] : ["hertz = 2 * pi"],
       "controller = Controller(", `    zeros=${roots(spec.zeros)},`, `    poles=${roots(spec.poles)},`,
       `    gain=${spec.gain},`, ")", "loop = Loop(", `    controller, ${sensor},`,
       `    tau1=${spec.tau1}, tau2=${spec.tau2}, delay=${spec.delay},`, ")",
-      `count = unstable_roots(loop, ${c1}, ${c2})`, `print(count, rightmost_root(loop, ${c1}, ${c2}))`,
-      "if count == 0:", `    print(margins(loop, ${c1}, ${c2}))`, "for direction in [(1, -1), (-1, 1), (1, 1), (-1, -1)]:",
-      "    print(direction, critical_perturbation(loop, direction))", ""].join("\n");
+      `count = unstable_roots(loop, ${c1}, ${c2})`, 'print(f"unstable roots: {count}")',
+      `print(f"rightmost root: {rightmost_root(loop, ${c1}, ${c2}):.4g} rad/s")`,
+      "if count == 0:", `    found = margins(loop, ${c1}, ${c2})`,
+      '    print(f"gain factors of a stable loop: {found.gain_lower:.4g} to {found.gain_upper:.4g}")',
+      '    print(f"phase margin: {degrees(found.phase):.4g} degrees")', '    print(f"delay margin: {found.delay:.4g} s")',
+      '    print(f"smallest |1 + L|: {found.modulus:.4g}")',
+      "if unstable_roots(loop, 1, 1) == 0:", "    for direction in [(1, -1), (-1, 1), (1, 1), (-1, -1)]:",
+      "        size = critical_perturbation(loop, direction)",
+      '        print(f"critical perturbation along {direction}: {size:.4g}")', ""].join("\n");
   }
 
   const SHORT = { sensor: "s", tau1: "t1", tau2: "t2", delay: "d", gain: "g", corner: "p",
@@ -171,5 +184,5 @@ const armlockText = (function () {
       pinned: parts.has("pin") ? loopOf(new URLSearchParams(parts.get("pin"))) : null };
   }
 
-  return { TURN, say, scientific, power, duration, time, exact, shortest, written, formula, python, address, fromAddress };
+  return { TURN, say, scientific, power, duration, time, exact, shortest, written, formula, described, python, address, fromAddress };
 })();
