@@ -58,6 +58,7 @@ from armlock.performance.budget import NoiseBudget, noise_budget
 from armlock.performance.pulling import pulling
 from armlock.performance.transfer import transfer
 from armlock.robustness import (
+    Many,
     Margins,
     box_count,
     critical_perturbation,
@@ -86,7 +87,7 @@ from armlock.stability.semidiscretization import (
 )
 from armlock.systems import System, delay, equation, parameter, s
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
-from armlock.timedomain.responses import impulse_response, step_response
+from armlock.timedomain.responses import impulse_response, step_info, step_response
 from armlock.timedomain.simulation import (
     DivergenceError,
     Simulation,
@@ -125,6 +126,7 @@ __all__ = [
     "HayesEquation",
     "LaserNoise",
     "Loop",
+    "Many",
     "Margins",
     "NoiseBudget",
     "NyquistCurve",
@@ -170,6 +172,7 @@ __all__ = [
     "stability_chart",
     "stable_half_differences",
     "state_space",
+    "step_info",
     "step_response",
     "transfer",
     "transition_matrix",

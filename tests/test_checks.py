@@ -98,6 +98,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.stable_half_differences: {"loop": paper_loop()},
     equation: {"d": 1 + ARMS, "step": 0.0, "at_zero": 0},
     armlock.step_response: {"system": ARMS.feedback(), "timepts": [1.0]},
+    armlock.step_info: {"system": ARMS.at(c1=0.5).feedback(), "timepts": [1.0, 9.0]},
     armlock.impulse_response: {"system": ARMS.feedback(), "timepts": [1.0]},
     armlock.Simulation(ARMS, 10.0).advance: {"noise": [1.0]} | POINT,
     LASER.blocks: {"samples": 3, "size": 2},

@@ -25,6 +25,7 @@ from armlock import (
     paper_loop,
     parameter,
     rightmost_root,
+    step_info,
     step_response,
     unstable_roots,
 )
@@ -366,3 +367,21 @@ def test_terms_that_cancel_cost_no_digits():
         assert doubled == pytest.approx(2.0 * found, rel=2e-12), name
     # Two objects of one length cancel everywhere.
     assert (delay(1.0) * delay(1.0) - delay(2.0))(0.3 + 1j) == 0.0
+
+
+def test_the_numbers_of_a_step_are_relative_to_the_final_value_of_the_system():
+    """Of a mode of two poles, in closed form, and at times that end before it has settled."""
+    damping = 0.3
+    mode = 2.5 / (laplace**2 + 2.0 * damping * laplace + 1.0) * delay(1.0)
+    fast = np.sqrt(1.0 - damping**2)
+    overshoot = 100.0 * np.exp(-np.pi * damping / fast)
+    for end in (6.0, 60.0):
+        info = step_info(mode, np.linspace(0.0, end, 6001))
+        assert info["Overshoot"] == pytest.approx(overshoot, rel=1e-4)
+        assert info["PeakTime"] == pytest.approx(1.0 + np.pi / fast, abs=end / 6000)
+        assert info["SteadyStateValue"] == 2.5
+        assert np.isnan(info["SettlingTime"]) == (end == 6.0)
+    assert step_info(mode, 60.0, SettlingTimeThreshold=0.5)["SettlingTime"] < 5.0
+    for system, word in ((1 / laplace, "be stable"), (laplace / (laplace + 1), "final value")):
+        with pytest.raises(ValueError, match=f"^system must .*{word}"):
+            step_info(system, 9.0)

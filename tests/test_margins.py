@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import pickle
+import re
+from typing import Any
+
 import control
 import mpmath
 import numpy as np
@@ -24,9 +28,12 @@ from armlock import (
     margins,
     modulus_margin,
     paper_loop,
+    parameter,
+    peak_gain,
     s,
     stability_chart,
     unstable_roots,
+    varying_radius,
 )
 from armlock.affine import Affine
 from armlock.engine import chain, polynomials
@@ -672,3 +679,38 @@ def test_the_reserve_of_an_arc_bounds_all_its_turns():
         p = sum((a + np.exp(1j * psi) * b) * c for a, b, c in zip(f, g, products, strict=True))
         least = np.abs(p).min()
         assert 0.75 * least - 0.1 < chain.arc_reserve(lags, g, f, angle) <= least
+
+
+def test_lists_and_arrays_have_the_results_of_each_and_the_reasons_of_those_without():
+    loops = [SingleArm(0.5), CommonArm(0.1), CommonArm(0.1).replace(delay=2.0)]
+    c = np.array([0.5, 0.9, 1.3])
+    found: Any = margins(loops, c[:, None], c2=0.8)
+    assert found.modulus.shape == (3, 3)
+    for (i, k), modulus in np.ndenumerate(found.modulus):
+        if reason := found.reasons[i, k]:
+            assert np.isnan(modulus)
+            with pytest.raises(ValueError, match=re.escape(reason)):
+                margins(loops[k], c[i], c2=0.8)
+        else:
+            single = margins(loops[k], c[i], c2=0.8)
+            assert (modulus, found.results[i, k]) == (single.modulus, single)
+    assert 0 < np.isnan(found.modulus).sum() < 9
+    k = parameter("k")
+    peaks: Any = peak_gain([k / 3 / (s + 1), k / (s + 2)], k=[3.0, 5.0])
+    assert peaks.gain.tolist() == pytest.approx([1.0, 2.5])
+    assert peak_gain(k / (s + 2), k=3.0).gain == pytest.approx(1.5)
+    assert modulus_margin(SingleArm(), [0.5, 0.9]).value[1] == modulus_margin(SingleArm(), 0.9)
+    radii: Any = varying_radius([SingleArm(), CommonArm()], 0.9, 0.8)
+    assert radii.radius[1] == varying_radius(CommonArm(), 0.9, 0.8).radius
+    edges = critical_perturbation([CommonArm(g) for g in (0.1, 1.0)], (-1.0, -1.0))
+    assert edges.value[1] == critical_perturbation(CommonArm(1.0), (-1.0, -1.0))
+    again = pickle.loads(pickle.dumps(found))
+    assert np.array_equal(again.phase, found.phase, equal_nan=True)
+    assert "results" in repr(found)
+    assert "of 9" in found._repr_html_()
+    with pytest.raises(ValueError, match=r"^c1 must be finite, got nan at index 1"):
+        margins(SingleArm(), [0.5, np.nan])
+    with pytest.raises(ValueError, match="must broadcast together"):
+        margins(loops, [0.5, 0.6])
+    with pytest.raises(AttributeError, match="nothing"):
+        found.nothing()

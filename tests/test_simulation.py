@@ -76,6 +76,22 @@ def test_impulse_response_is_the_closed_form(name):
     assert np.fft.rfft(output)[1:-1] == pytest.approx(expected, rel=1e-9, abs=1e-11)
 
 
+@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("arm", [1, 2])
+def test_noise_of_an_arm_is_answered_as_the_closed_form_says(name, arm):
+    loop, rate = LOOPS[name]
+    impulse = np.zeros(1 << 14)
+    impulse[0] = 1.0
+    none = np.zeros(impulse.size)
+    given: Any = {"c1": 0.8, "c2": -0.6, f"arm{arm}": impulse}
+    output = simulate(loop, none, sample_rate=rate, **given)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(impulse.size, 1.0 / rate)[1:-1]
+    opened = sampled_open_loop(loop, omega, c1=0.8, c2=-0.6, sample_rate=rate)
+    s = 2j * rate * np.tan(0.5 * omega / rate)
+    expected = -loop.controller(s) * loop.mapping.weights(s)[arm - 1] / (1.0 + opened)
+    assert np.fft.rfft(output)[1:-1] == pytest.approx(expected, rel=1e-8, abs=1e-11)
+
+
 def test_sampled_loop_tends_to_the_continuous_one():
     loop = paper_loop()
     omega = np.geomspace(1e-4, 2.0 * np.pi, 80)

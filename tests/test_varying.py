@@ -179,7 +179,7 @@ def test_an_expression_does_not_say_where_a_factor_acts():
     for expression in (alike, paper_loop() * 1, paper_loop().at(c1=1.0), 0.5 * delay(1.0)):
         message = r"^loop must be a Loop.* not commute .*loop\.replace.*1 / peak_gain\(G\)"
         with pytest.raises(TypeError, match=message):
-            varying_radius(expression)  # type: ignore[arg-type]
+            varying_radius(expression)
     # If both stood before the filter, S F / 2 would be added twice.
     gain = peak_gain(0.5 * filtered / (1 + filtered * delay(1e-6))).gain
     assert 1.0 / (2.0 * gain) == pytest.approx(1.01, rel=1e-4)

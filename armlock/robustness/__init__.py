@@ -5,6 +5,7 @@ cannot be certified is refused.
 """
 
 from armlock.engine.margins import Margins
+from armlock.robustness.many import Many
 from armlock.robustness.margins import PeakGain, margins, modulus_margin, peak_gain
 from armlock.robustness.perturbations import (
     Crossing,
@@ -17,6 +18,7 @@ from armlock.robustness.varying import VaryingRadius, varying_radius
 
 __all__ = [
     "Crossing",
+    "Many",
     "Margins",
     "PeakGain",
     "VaryingRadius",

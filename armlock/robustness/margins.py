@@ -11,6 +11,8 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
+import numpy.typing as npt
+
 from armlock.affine import Affine, open_quotient
 from armlock.checks import positive_number, real_number
 from armlock.engine import decide
@@ -26,6 +28,7 @@ from armlock.engine.margins import (
     require_stable,
 )
 from armlock.loops import checked_loop
+from armlock.robustness.many import many
 from armlock.stability.counts import decided
 from armlock.systems import Sum, System, delay_object
 from armlock.tables import Table, as_html, as_text, at, decibels, number
@@ -40,8 +43,8 @@ _TRIED = sorted((10.0 ** (k / 4) for k in range(-12, 13)), key=lambda k: max(k, 
 def _certified(
     compute: Callable[[Function, Function], _T],
     loop: System,
-    values: tuple[float, ...],
-    numbers: dict[str, float],
+    values: tuple[npt.ArrayLike, ...],
+    numbers: dict[str, npt.ArrayLike],
 ) -> _T:
     """Return what the engine makes of numerator and denominator of a loop."""
     n, m, point = open_quotient(loop, values, numbers)
@@ -66,7 +69,8 @@ def _with_a_gain(n: Function, m: Function) -> Margins:
         raise ValueError(f"{error}; {found}") from None
 
 
-def modulus_margin(loop: System, *values: float, **numbers: float) -> float:
+@many()
+def modulus_margin(loop: Any, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> Any:
     r"""Smallest distance of the Nyquist curve from -1, min over omega of |1 + L|.
 
     .. math::
@@ -79,13 +83,14 @@ def modulus_margin(loop: System, *values: float, **numbers: float) -> float:
     ----------
     loop : System
         The open loop L, whose closed loop is stable or not. A closed loop in place of L would
-        be closed again.
-    *values, **numbers : float, optional
+        be closed again. A list of loops is taken too.
+    *values, **numbers : float or array_like, optional
         The parameters, in the order of their first use or by name; nominal ones by default.
+        Lists of loops and arrays broadcast.
 
     Returns
     -------
-    float
+    float, or `Many` with the attribute `value` of lists and arrays
         The infimum over all omega > 0, the limit at high frequency included, to a part in a
         million (a thousandth where rounding at high frequency allows no more). For a neutral
         loop that limit is taken over all small changes of the delays: it is 0 where the neutral
@@ -121,7 +126,8 @@ class PeakGain(NamedTuple):
     __repr__, _repr_html_ = as_text, as_html  # type: ignore[misc]
 
 
-def peak_gain(system: Any) -> PeakGain:
+@many()
+def peak_gain(system: Any, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> PeakGain:
     r"""Largest gain of a stable system over all frequencies, its H-infinity norm.
 
     .. math::
@@ -131,12 +137,15 @@ def peak_gain(system: Any) -> PeakGain:
     Parameters
     ----------
     system : System
-        The system itself, for instance the sensitivity ``1 / (1 + loop)``, at nominal
-        parameters. Of a `Loop` it is the open loop.
+        The system itself, for instance the sensitivity ``1 / (1 + loop)``, or a list of them.
+        Of a `Loop` it is the open loop.
+    *values, **numbers : float or array_like, optional
+        The parameters, in the order of their first use or by name; nominal ones by default.
+        Lists of systems and arrays broadcast.
 
     Returns
     -------
-    PeakGain
+    PeakGain, or `Many` of lists and arrays
         The gain, which no frequency exceeds by more than a part in a million (a thousandth
         where rounding at high frequency allows no more), and where it is in rad/s: 0 where it
         is the limit at s = 0, inf where it is the limit at high frequency, nan for a system
@@ -168,9 +177,9 @@ def peak_gain(system: Any) -> PeakGain:
     >>> print(f"{gain:.4f} at {omega:.3e} rad/s")
     1.6246 at 2.291e-05 rad/s
     """
-    n, d, point = open_quotient(system, (), {}, "system")
+    n, d, point = open_quotient(system, values, numbers, "system")
     given = System.of(system, "system")
-    held = given.at(**given.nominal)
+    held = given.at(**dict(zip(given.parameters, point.tolist(), strict=True)))
     if held.numerator.degree > held.denominator.degree:
         raise ValueError(
             "system must be proper, or its gain grows without limit, got a numerator of degree "
@@ -186,11 +195,12 @@ def peak_gain(system: Any) -> PeakGain:
     return PeakGain(1.0 / found.value, found.omega)
 
 
+@many()
 def margins(
-    loop: System,
-    *values: float,
+    loop: Any,
+    *values: npt.ArrayLike,
     free_above: float | None = None,
-    **numbers: float,
+    **numbers: npt.ArrayLike,
 ) -> Margins:
     r"""Compute all margins of a stable loop.
 
@@ -198,20 +208,22 @@ def margins(
     ----------
     loop : System
         The open loop L, for instance `CommonArm()`; the margins are those of its closed loop,
-        1 + L = 0. A closed loop in place of L would be closed again.
-    *values : float, optional
-        The parameters, in the order of their first use; nominal ones by default.
+        1 + L = 0. A closed loop in place of L would be closed again. A list of loops is taken
+        too.
+    *values : float or array_like, optional
+        The parameters, in the order of their first use; nominal ones by default. Lists of loops
+        and arrays broadcast.
     free_above : float, optional
         Angular frequency in rad/s above which the phases of the arms of a `Loop` are taken as
         free, as they are once the arms have drifted by a fraction of the modulation's
         wavelength: the margins then hold for all of them. By default the phases are those of
         the delays, at all frequencies.
-    **numbers : float, optional
+    **numbers : float or array_like, optional
         Parameters by name.
 
     Returns
     -------
-    Margins
+    Margins, or `Many` of lists and arrays
 
     Raises
     ------
@@ -251,6 +263,12 @@ def margins(
     >>> from armlock import margins, paper_loop
     >>> print(f"{math.degrees(margins(paper_loop()).phase):.1f} degrees")
     36.0 degrees
+
+    Of several loops or points; where one is not stable, `Many.reasons` says so:
+
+    >>> from armlock import SingleArm
+    >>> margins(SingleArm(), [0.8, 0.9, 1.1]).modulus.round(4)
+    array([0.606 , 0.4435,    nan])
     """
     if free_above is None:
         return _certified(_with_a_gain, loop, values, numbers)

@@ -24,6 +24,7 @@ from armlock.engine.inclusion import EPSILON, TERM, VERTEX
 from armlock.engine.margins import first_zero
 from armlock.engine.polynomials import collected, exact, polynomial, rounded
 from armlock.loops import Loop, checked_loop
+from armlock.robustness.many import many
 from armlock.stability.counts import CountError, decided, unstable_roots
 from armlock.systems import Sum, System, delay_object
 from armlock.tables import Table, as_html, as_text, at, number
@@ -241,20 +242,21 @@ def first_crossing(
     return Crossing(u * ray.scale, omega)
 
 
-def critical_perturbation(loop: System, direction: Point) -> float:
+@many(points=False)
+def critical_perturbation(loop: Any, direction: Point) -> Any:
     r"""Return the smallest perturbation in a direction that breaks the loop.
 
     Parameters
     ----------
     loop : System
-        The open loop, for instance `CommonArm()`, or an equation.
+        The open loop, for instance `CommonArm()`, an equation, or a list of them.
     direction : sequence of float, or dict by name
         How the parameters change from their nominal values, which are (1, 1) for a `Loop`:
         taken as given and not normalised.
 
     Returns
     -------
-    float
+    float, or `Many` with the attribute `value` of a list
         Smallest eps > 0 such that the count of the loop's unstable roots at the nominal
         values + eps direction is not zero: a root reaches the imaginary axis there, or the
         neutral root chain does. 0 if the loop is not stable next to the nominal values, inf if

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from armlock.affine import Affine
 from armlock.checks import real_number
 from armlock.engine.functions import common_zeros
 from armlock.engine.margins import require_stable
 from armlock.engine.varying import constant_radius_of, varying_radius_of
-from armlock.loops import Loop, checked_loop
+from armlock.loops import checked_loop
+from armlock.robustness.many import many
 from armlock.stability.counts import decided
 from armlock.tables import Table, as_html, as_text, at, number
 
@@ -59,7 +61,10 @@ _PLACE = (
 )
 
 
-def varying_radius(loop: Loop, *values: float, **numbers: float) -> VaryingRadius:
+@many()
+def varying_radius(
+    loop: Any, *values: npt.ArrayLike, **numbers: npt.ArrayLike
+) -> VaryingRadius:
     r"""Find how far factors c_k(t) may vary, in any way, without making a loop unstable.
 
     Each factor acts on the delayed signal of its arm, before every filter: the arm returns
@@ -75,14 +80,14 @@ def varying_radius(loop: Loop, *values: float, **numbers: float) -> VaryingRadiu
     Parameters
     ----------
     loop : Loop
-        The loop, whose delays are constant.
-    *values, **numbers : float, optional
+        The loop, whose delays are constant, or a list of loops.
+    *values, **numbers : float or array_like, optional
         The constant point: the parameters, in the order of their first use or by name; nominal
-        ones by default.
+        ones by default. Lists of loops and arrays broadcast.
 
     Returns
     -------
-    VaryingRadius
+    VaryingRadius, or `Many` of lists and arrays
         The radius is certified from below. No other d makes it larger by more than a part in a
         million, as far as a search tells, or than rounding at high frequency hides, at most a
         thousandth.

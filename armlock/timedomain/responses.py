@@ -13,18 +13,21 @@ import warnings
 from functools import partial
 from heapq import heapify, heappop, heappush
 from math import factorial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpq_poly
 
-from armlock.affine import Affine
+from armlock.affine import Affine, open_quotient
 from armlock.checks import ComplexArray, FloatArray, finite_series, positive_number
 from armlock.engine.chain import Delay, Lag
 from armlock.engine.decide import count
+from armlock.engine.functions import common_zeros
 from armlock.engine.inclusion import EPSILON
+from armlock.engine.margins import require_stable
 from armlock.engine.polynomials import collected, enclosed_roots, exact, polynomial
+from armlock.stability.counts import decided
 from armlock.systems import Sum, System
 from armlock.systems import s as laplace
 from armlock.timedomain.inversion import Line, TooLongError, inverted
@@ -154,6 +157,57 @@ def impulse_response(system: System, timepts: npt.ArrayLike) -> control.TimeResp
     [0.       1.       0.367879]
     """
     return _response(System.of(system), timepts, "Impulse")
+
+
+def step_info(system: System, timepts: npt.ArrayLike, **options: Any) -> dict[str, float]:
+    """Return rise time, settling time, overshoot and others of a step response.
+
+    Parameters
+    ----------
+    system : System
+        As that of `step_response`; stable.
+    timepts : array_like of float, or float
+        As that of `step_response`. Times are found among these, and peaks at them.
+    **options
+        ``SettlingTimeThreshold`` and ``RiseTimeLimits`` of ``control.step_info``.
+
+    Returns
+    -------
+    dict of str to float
+        As from ``control.step_info``, with times in s and overshoot in percent. The final value
+        is that of the system at s = 0, and not the last sample. What has not settled by the
+        last time has a settling time of nan.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As those of `step_response`; if the system is not stable; or if its final value is zero,
+        to which nothing is relative.
+
+    Examples
+    --------
+    >>> import control
+    >>> from armlock import delay, step_info
+    >>> loop = control.tf([0.5], [1, 0]) * delay(1.0)
+    >>> info = step_info(loop.feedback(), 30.0)
+    >>> print(f"{info['Overshoot']:.2f} %, settled after {info['SettlingTime']:.2f} s")
+    4.05 %, settled after 6.06 s
+    """
+    import control
+
+    n, d, point = open_quotient(system, (), {}, "system")
+    with decided("no final value", point):
+        require_stable(d, common_zeros(n, d), "system", "pole")
+    final = float(np.real(System.of(system)(0.0)))
+    if not final:
+        raise ValueError(
+            f"system must have a final value that is not zero, got {system!r:.200}"
+        )
+    found = step_response(system, timepts)
+    info: dict[str, float] = control.step_info(
+        found.outputs, T=found.time, yfinal=final, **options
+    )
+    return info
 
 
 def _response(system: System, timepts: npt.ArrayLike, what: str) -> control.TimeResponseData:

@@ -3,7 +3,7 @@
 With phi the frequency noise of the locked laser, every loop of `armlock.loops` reads
 
     phi(t) = noise(t) - K [m1 u1 + m2 u2](t),
-    u_k(t) = phi(t) - c_k(t) phi(t - tau_k).
+    u_k(t) = phi(t) - c_k(t) phi(t - tau_k) + n_k(t).
 
 Controller and sensor are sampled by the trapezoidal rule (`armlock.timedomain.discretize`). The
 present phi stands on both sides with a weight of thousands, and each sample solves for it: a
@@ -97,11 +97,12 @@ def _compute(
 ) -> int:
     """Compute the last samples of phi from those before, one for each sample of the noise.
 
-    `inputs` are noise, c1 and c2. `work` is described at `_STATES`, and `done` counts the
-    samples of the run before this call. Returns the index of the sample that exceeds `limit`
-    times the largest input, or the number of samples.
+    `inputs` are noise, c1, c2, and what is added to the signals of both arms. `work` is
+    described at `_STATES`, and `done` counts the samples of the run before this call. Returns
+    the index of the sample that exceeds `limit` times the largest input, or the number of
+    samples.
     """
-    noise, c1, c2 = inputs
+    noise, c1, c2, added1, added2 = inputs
     rows, sections, gain = sensor.states, controller.sections, controller.gain
     m, n = len(rows), len(sections)
     direct1, direct2 = sensor.direct
@@ -116,9 +117,9 @@ def _compute(
     end = len(noise)
     for i in range(len(noise)):
         now = len(phi) - len(noise) + i
-        a1 = c1[np.uintp(i)] * _delayed(phi, now, arms[0], i)
-        a2 = c2[np.uintp(i)] * _delayed(phi, now, arms[1], i)
-        given = noise[np.uintp(i)]
+        n1, n2, given = added1[np.uintp(i)], added2[np.uintp(i)], noise[np.uintp(i)]
+        a1 = c1[np.uintp(i)] * _delayed(phi, now, arms[0], i) - n1
+        a2 = c2[np.uintp(i)] * _delayed(phi, now, arms[1], i) - n2
         # x = given - predicted - now1 (x - a1) - now2 (x - a2), solved for x.
         x = (given + (now1 * a1 + now2 * a2) - predicted) * inverse
         u1, u2 = x - a1, x - a2
@@ -141,7 +142,7 @@ def _compute(
             v += t1 * w1 + t2 * w2
             work[state], work[state + np.uintp(1)] = new1 + direct, new2
         predicted = gain * ready + (next1 * u1 + next2 * u2)
-        most = max(most, abs(given))
+        most = max(most, abs(given), abs(n1), abs(n2))
         if abs(x) <= most:
             bounded = float(done + i)
         elif not abs(x) <= limit * most:
@@ -337,7 +338,13 @@ class Simulation(Shown):
         return Table("Simulation", rows)
 
     def advance(
-        self, noise: npt.ArrayLike, *, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
+        self,
+        noise: npt.ArrayLike,
+        *,
+        c1: npt.ArrayLike = 1.0,
+        c2: npt.ArrayLike = 1.0,
+        arm1: npt.ArrayLike = 0.0,
+        arm2: npt.ArrayLike = 0.0,
     ) -> FloatArray:
         """Compute the next block.
 
@@ -347,6 +354,8 @@ class Simulation(Shown):
             Noise of the free-running laser; the output has its unit.
         c1, c2 : float or array_like, shape (n,), optional
             Multiplicative perturbations.
+        arm1, arm2 : float or array_like, shape (n,), optional
+            Noise that is added to the signals of the arms, in the unit of `noise`.
 
         Returns
         -------
@@ -363,7 +372,8 @@ class Simulation(Shown):
             If the output exceeds its limit. The run cannot be continued.
         """
         given = self._series("noise", noise, None)
-        inputs = given, self._series("c1", c1, given), self._series("c2", c2, given)
+        others = {"c1": c1, "c2": c2, "arm1": arm1, "arm2": arm2}
+        inputs = given, *(self._series(name, one, given) for name, one in others.items())
         output, done = np.empty(given.size), 0
         while done < given.size and not self._diverged:
             part = tuple(
@@ -449,6 +459,8 @@ def simulate(
     sample_rate: float,
     c1: npt.ArrayLike = 1.0,
     c2: npt.ArrayLike = 1.0,
+    arm1: npt.ArrayLike = 0.0,
+    arm2: npt.ArrayLike = 0.0,
     tau1: Moving | None = None,
     tau2: Moving | None = None,
     limit: float = LIMIT,
@@ -460,7 +472,7 @@ def simulate(
     .. math::
 
         \varphi(t) &= \varphi_0(t) - K \left[ m_1 u_1 + m_2 u_2 \right](t) , \\
-        u_k(t) &= \varphi(t) - c_k(t)\, \varphi(t - \tau_k(t)) .
+        u_k(t) &= \varphi(t) - c_k(t)\, \varphi(t - \tau_k(t)) + n_k(t) .
 
     Parameters
     ----------
@@ -472,6 +484,9 @@ def simulate(
         Of the noise, of c1 and of c2, in Hz.
     c1, c2 : float or array_like, shape (n,), optional
         Multiplicative perturbations of the two arms.
+    arm1, arm2 : float or array_like, shape (n,), optional
+        Noise :math:`n_k` that is added to the signals of the arms, such as shot noise, in the
+        unit of `noise`. `noise_budget` has its densities.
     tau1, tau2, limit
         As for `Simulation`.
 
@@ -509,4 +524,4 @@ def simulate(
     >>> step = simulate(paper_loop(), np.ones(2000), sample_rate=200.0, tau1=arm)
     """
     run = Simulation(loop, sample_rate, tau1=tau1, tau2=tau2, limit=limit)
-    return run.advance(noise, c1=c1, c2=c2)
+    return run.advance(noise, c1=c1, c2=c2, arm1=arm1, arm2=arm2)
