@@ -216,7 +216,8 @@ def noise_budget(
         In Hz, positive.
     laser : callable, or object with a method asd, optional
         Noise of the free laser in Hz/sqrt(Hz) as a function of the frequency in Hz, for
-        instance a `LaserNoise`. By default 30 kHz/sqrt(Hz) at 1 Hz, falling as 1/f.
+        instance a `LaserNoise`. By default 30 kHz/sqrt(Hz) at 1 Hz, falling as 1/f. A measured
+        table makes such a function: ``lambda f: numpy.interp(f, frequencies, densities)``.
     shot : float, optional
         Shot noise of one link in cycles/sqrt(Hz), 1e-5 by default.
     clock : float, optional
