@@ -429,6 +429,8 @@ def test_moving_averages_in_a_matrix_are_stated():
     for line in (-0.2, -0.4):
         count = independent.winding(lambda at, line=line: d(at + line), 300.0, 5.0)
         assert unstable_roots(found, right_of=line) == count
+    for fewer in (None, 1):
+        assert rightmost_root(return_difference(plant, [1, 2], at_zero=fewer)) == 0.0
     with pytest.raises(ValueError, match=r"got 3: there are 2 .* clearing .* makes 2"):
         return_difference(plant, [1, 2], at_zero=3)
 

@@ -23,6 +23,9 @@ from armlock.engine.polynomials import Polynomial, exact
 #: What rounding makes of a determinant: at most this share of sum |a_ij cofactor_ij|. It covers
 #: all changes of coordinates that were drawn, of two to five states.
 ROUNDED = fmpq(512, 2**53)
+#: What rounding makes of a root of a polynomial that was multiplied out: this share of the
+#: largest root. python-control makes as much of state spaces in coordinates of some condition.
+MULTIPLIED = fmpq(1, 2**39)
 # So many of the lowest coefficients are asked.
 _ASKED = 3
 # What is counted by each number that may be stated.
@@ -213,7 +216,7 @@ def _bounds_of_product(given: Polynomial) -> list[fmpq]:
     for first in range(_ASKED):
         bounds = [fmpq(0)]
         for number in range(first + 1, min(first + _ASKED, p.degree() + 1)):
-            lead = ROUNDED * abs(p[number])
+            lead = MULTIPLIED * abs(p[number])
             bounds = [lead * largest ** (number - k) for k in range(first, number)]
             if all(abs(p[k]) < x for k, x in enumerate(bounds, first)):
                 break

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import flint
@@ -493,6 +494,11 @@ def rightmost_zero(function: Function, common: int = 0) -> complex:
     """
     if not function.delayed.any():
         return _first(_of_polynomial(function, common))
+    if function.lowest and function.lowest[0] > common:
+        # One at s = 0 is exact, however many coincide there.
+        with suppress(UndecidedError):
+            if decide.count(function, function.lowest[0]) == 0:
+                return 0j
     try:
         return _searched(function, common)
     except RootError:

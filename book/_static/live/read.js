@@ -330,7 +330,7 @@ const armlockRead = (function () {
 
   /* What rounding makes of a coefficient that is meant to be zero, as a share of its terms: the package
    * refuses such a system until it is stated what is meant. */
-  const ROUNDED = 2 ** -44;
+  const ROUNDED = 2 ** -44, MULTIPLIED = 2 ** -39;
   const hide = (value, off) => { if (!isNil(value) && sizeOf(value) < off) value.off = Math.max(value.off, off); };
 
   /* A state space of one input and output, exactly: numerator and denominator are determinants. */
@@ -898,7 +898,7 @@ const armlockRead = (function () {
       // A root of polynomials that were multiplied out is rounded by a share of the largest one.
       const largest = p.length > 2 ? Math.max(...rootsExactly(p).map(root => Math.hypot(...root))) : 0;
       for (const number of [1, 2]) {
-        const bounds = Array.from({ length: number }, (_, k) => p.length > number && ROUNDED * sizeOf(p[number]) * largest ** (number - k));
+        const bounds = Array.from({ length: number }, (_, k) => p.length > number && MULTIPLIED * sizeOf(p[number]) * largest ** (number - k));
         if (bounds.every((bound, k) => p[k] && sizeOf(p[k]) < bound)) bounds.forEach((bound, k) => hide(p[k], bound));
       }
       return ofPolynomial(p);
