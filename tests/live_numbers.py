@@ -225,8 +225,8 @@ class Comparison:
                 inside, outside = (closed_loop_count(loop, *point) for point in near)
                 return first if first < ours and inside == 0 < outside else math.nan
 
-            # The page looks no farther than 2, and its 0 is at most 1e-12.
-            ours = math.inf if ours > 2.0 else ours if ours > 1e-12 else 0.0
+            # The page looks no farther than 2, and where it says 0 this is at most 1e-12.
+            ours = math.inf if ours > 2.0 else 0.0 if hers == "0" and ours <= 1e-12 else ours
             self.number(f"break {direction}", case, hers, ours, lost_earlier)
         ours = self.package("margins", margins, loop, *point)
         hers = page["margins"]

@@ -271,7 +271,8 @@ def critical_perturbation(loop: Any, direction: Point) -> Any:
         the nominal values themselves. A boundary point is allowed there.
     CountError
         If rounding, or the steps allowed, do not decide it, or the counts on the two sides of
-        the result contradict it.
+        the result contradict it. So far away as 1e8 a count may take too many steps:
+        `first_crossing` with a `stop` then tells what happens up to there.
 
     See Also
     --------

@@ -507,6 +507,8 @@ function armlockPages() {
     let pasted = null;
     const understood = element("p", { class: "live-formula" });
     const doubt = element("p", { class: "live-note live-wrong", role: "status" });
+    // What the controller stands in: a pasted one stands in the sensor and the arms of the loop before.
+    const around = element("p", { class: "live-note live-around" });
 
     /* The address holds the loop, and its history undoes what was done to it. */
     live.moved = step => {
@@ -632,10 +634,11 @@ function armlockPages() {
         // Too few poles are too many zeros: the field that was edited is the one to look at.
         const name = error.field === "zeros" && edited === "poles" ? edited : error.field;
         if (errors[name]) blame(name, error.message);
+        if (edited) presets.value = "";
         wrong.textContent = error.message;
         undo.disabled = false;
         live.none("There is no loop to show, because a field has an error.");
-        code.textContent = understood.textContent = doubt.textContent = "";
+        code.textContent = understood.textContent = around.textContent = doubt.textContent = "";
         orbit.removeAttribute("href");
         roots.draw();
       }
@@ -648,6 +651,7 @@ function armlockPages() {
       const same = pasted && parts(pasted) === parts(spec);
       understood.textContent = `${formula(spec)}${pasted && !same ? ". It was changed after the text above was pasted." : ""}`;
       doubt.textContent = same ? pasted.doubt : "";
+      around.textContent = described(spec);
     };
 
     const put = spec => {
@@ -776,7 +780,7 @@ function armlockPages() {
           button("Whole", () => live.chart.show([0, 0], 3)), button("Copy numbers", () => live.copy())), live.note, live.numbers),
       element("div", { class: "live-side" }, element("div", { class: "live-top" }, preset, wrong),
         element("div", { class: "live-panel" }, live.summary, gain, dead),
-        element("div", { class: "live-paste" }, paste, understood, doubt), element("div", { class: "live-fields" }, inputs, legend(" In the s-plane: poles and zeros of the controller, the closed-loop root that crosses at the smallest critical perturbation, and the rightmost root. Shaded disc around \u22121 in the Nyquist "
+        element("div", { class: "live-paste" }, paste, understood, around, doubt), element("div", { class: "live-fields" }, inputs, legend(" In the s-plane: poles and zeros of the controller, the closed-loop root that crosses at the smallest critical perturbation, and the rightmost root. Shaded disc around \u22121 in the Nyquist "
           + "plot, and dashed line in Bode\u2019s plot: the bound on |S|."), element("p", {}, orbit)))),
     element("details", {}, element("summary", {}, "This loop in Python"), code));
 
