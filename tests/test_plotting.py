@@ -135,18 +135,6 @@ def test_a_figure_carries_its_data_and_an_svg(ax, chart):
     assert "7" not in rows[0] + rows[1]
 
 
-def test_the_data_of_a_long_curve_keep_its_nulls_and_peaks(ax):
-    x = np.arange(40_000.0)
-    y = 1 + 0.1 * np.sin(x / 500)
-    y[12_345], y[30_001], y[20_000] = 1e-6, 50.0, np.nan
-    ax.plot(x, y, label="long")
-    data = figures.drawn(ax.figure)
-    assert len(data["long, y"]) <= 1002
-    assert data["long, y"][[0, -1]].tolist() == y[[0, -1]].tolist()
-    for place in (12_345, 30_001):
-        assert data["long, y"][data["long, x"] == place].tolist() == [y[place]]
-
-
 def test_the_data_of_a_chart_are_its_counts_at_its_points(chart):
     ax = chart.plot(plt.figure().add_subplot(), largest=50)
     ax.figure.colorbar(ax.images[0], ax=ax)
