@@ -109,7 +109,7 @@ def plot_chart(
         patches = [Patch(facecolor=color, label=name) for name, color in tops.items()]
         patches = patches if counts else patches[:1]
         title = "unstable roots" if counts else None
-        ax.legend(handles=patches, title=title, fontsize=8, title_fontsize=8)
+        ax.legend(handles=patches, title=title, fontsize=10, title_fontsize=10)
     return ax
 
 
@@ -133,7 +133,7 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
             if depth[row, column] >= room:
                 box = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
                 x, y = chart.x[column - 1], chart.y[row - 1]
-                ax.text(x, y, str(count), ha="center", va="center", fontsize=8, bbox=box)
+                ax.text(x, y, str(count), ha="center", va="center", fontsize=10, bbox=box)
 
 
 def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
@@ -282,7 +282,7 @@ def _mark(ax: Axes, curve: NyquistCurve, margins: Margins) -> None:
         if curve.omega[0] <= omega <= curve.omega[-1]:
             there = np.array([np.interp(omega, curve.omega, curve.response)])
             ax.plot(*_coordinates(ax, there), marker, color=ORANGE, label=label)
-    ax.legend(fontsize=8)
+    ax.legend(fontsize=10)
 
 
 def _infinite_branch(ax: Axes, curve: NyquistCurve) -> None:
