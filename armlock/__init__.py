@@ -27,7 +27,7 @@ The calls that matter most:
 - ``noise_budget(loop, frequency)`` is the noise of the locked laser, source by source.
 
 Angular frequencies are in rad/s, frequencies in Hz, and delays in s. The first chart and
-the first margins of an installation compile what they need, which takes 5 to 20 s.
+the first margins of an installation compile what they need, which takes some 20 s.
 ``help(armlock.margins)`` describes one function. The modules `armlock.controllers`,
 `armlock.sensors`, `armlock.orbits` and `armlock.paper` hold controllers, sensors, real arms
 and the numbers of the paper.

@@ -30,8 +30,8 @@ from numba.core.caching import FunctionCache
 from numba.core.event import Listener, register
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-# After so many seconds compiling says that it does.
-_PATIENCE = 1.0
+# After so many seconds compiling says that it does, and work shows its progress.
+_PATIENCE, _PATIENCE_OF_WORK = 1.0, 2.0
 
 
 _lost: list[Exception] = []
@@ -72,12 +72,13 @@ class _Kept(FunctionCache):  # type: ignore[misc]
 class _Notice(Listener):  # type: ignore[misc]
     """A line that says, once in a process, what takes so long while numba compiles."""
 
-    depth, said = 0, False
+    depth, said, begun, seconds = 0, False, 0.0, 0.0
 
     def on_start(self, event: Any) -> None:
         """Begin to wait with the first function; others are compiled on its way."""
         self.depth += 1
         if self.depth == 1:
+            self.begun = time.monotonic()
             self.timer = Timer(_PATIENCE, self.say)
             self.timer.daemon = True
             self.timer.start()
@@ -87,6 +88,12 @@ class _Notice(Listener):  # type: ignore[misc]
         self.depth -= 1
         if self.depth == 0:
             self.timer.cancel()
+            self.seconds += time.monotonic() - self.begun
+
+    def taken(self) -> float:
+        """Return the seconds of compiling since this was asked last."""
+        found, self.seconds = self.seconds, 0.0
+        return found
 
     def say(self) -> None:
         """Print the line."""
@@ -98,6 +105,23 @@ class _Notice(Listener):  # type: ignore[misc]
 
 notice = _Notice()
 register("numba:compile", notice)
+
+
+class Progress(tqdm):  # type: ignore[misc]
+    """A progress bar that shows after two seconds of work; compiling is none."""
+
+    def __init__(self, total: int, what: str, unit: str) -> None:
+        notice.taken()
+        super().__init__(
+            total=total, desc=what, unit=unit, delay=_PATIENCE_OF_WORK, leave=False,
+            smoothing=0.0,
+        )  # fmt: skip
+
+    def update(self, n: float = 1) -> Any:
+        """Count work that is done."""
+        if not self.disable:
+            self.start_t += notice.taken()
+        return super().update(n)
 
 
 class Plain:

@@ -250,7 +250,8 @@ def check_system(name: str, system: Any, others: str) -> None:
     if not system.issiso():
         raise ValueError(
             f"{name} must have one input and one output, got {system.ninputs} and "
-            f"{system.noutputs}"
+            f"{system.noutputs}: return_difference(plant, [k1 * delay(h), k2]) takes a plant "
+            "of several, with the delays in its controllers"
         )
     check_continuous(name, system)
 
@@ -260,7 +261,8 @@ def check_continuous(name: str, system: Any) -> None:
     if system.isdtime(strict=True):
         raise ValueError(
             f"{name} must be continuous in time, got sampling time {system.dt}: give the "
-            "continuous system from which it was sampled"
+            "continuous system from which it was sampled; for a controller that is born "
+            'discrete see the recipe "A digital controller"'
         )
 
 

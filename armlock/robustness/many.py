@@ -10,16 +10,14 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
-from tqdm import tqdm  # type: ignore[import-untyped]
 
 from armlock.checks import FloatArray, broadcast_shape, real_array
+from armlock.compiled import Progress
 from armlock.stability.counts import CountError
 from armlock.systems import System
 from armlock.tables import Shown, Table, spread
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-# The progress is shown after so many seconds.
-_PATIENCE = 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -99,16 +97,18 @@ def many(*, points: bool = True) -> Callable[[_Function], _Function]:
             shape = broadcast_shape(names, (which, *arrays.values()))
             every: Any = np.broadcast_arrays(which, *arrays.values(), np.empty(shape))
             results, reasons = np.full(shape, None, object), np.full(shape, "", object)
-            bar = {"total": which.size, "delay": _PATIENCE, "leave": False}
-            for k in tqdm(np.ndindex(shape), function.__name__, **bar):
-                point = given | {
-                    place: float(one[k]) for place, one in zip(arrays, every[1:], strict=False)
-                }
-                here = [point.pop(i) for i in range(len(values))]
-                try:
-                    results[k] = function(loops[every[0][k]], *here, **point)
-                except (ValueError, CountError) as error:
-                    reasons[k] = str(error)
+            with Progress(results.size, function.__name__, " points") as progress:
+                for k in np.ndindex(shape):
+                    point = given | {
+                        place: float(one[k])
+                        for place, one in zip(arrays, every[1:], strict=False)
+                    }
+                    here = [point.pop(i) for i in range(len(values))]
+                    try:
+                        results[k] = function(loops[every[0][k]], *here, **point)
+                    except (ValueError, CountError) as error:
+                        reasons[k] = str(error)
+                    progress.update()
             return Many(results, reasons)
 
         return cast("_Function", call)

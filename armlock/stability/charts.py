@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 from flint import fmpq
-from tqdm import tqdm  # type: ignore[import-untyped]
 
 from armlock.affine import Affine, NotAffineError
 from armlock.checks import BoolArray, FloatArray, IntArray, axis, check_memory, real_number
+from armlock.compiled import Progress
 from armlock.engine import chain
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
 from armlock.engine.functions import Function, stacked
@@ -46,8 +46,6 @@ _FINE = 1e-4
 # first, and then by as many as have this many crossings, or points; points are counted in
 # batches, of this size at first.
 _FEW, _ROWS, _MANY_CROSSINGS, _MANY_POINTS, _BATCH = 1024, 8, 2_000_000, 1_000_000, 1 << 9
-# The progress is shown after so many seconds.
-_PATIENCE = 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -221,7 +219,7 @@ def _by_rows(
 ) -> IntArray:
     """Count row by row: with the second parameter held, the first one is not multiplied."""
     ((name, values),) = y.items()
-    with _progress(values.size, " rows") as progress:
+    with Progress(values.size, "chart", " rows") as progress:
         rows = []
         for value in values:
             given: dict[str, Any] = {**x, name: value, **held}
@@ -230,13 +228,8 @@ def _by_rows(
     return np.array(rows)
 
 
-def _progress(total: int, unit: str) -> tqdm:
-    """Return the progress bar of a chart that takes longer."""
-    return tqdm(total=total, desc="chart", unit=unit, delay=_PATIENCE, leave=False)
-
-
 def _counted(
-    affine: Affine, x: FloatArray, y: FloatArray, progress: tqdm | None = None
+    affine: Affine, x: FloatArray, y: FloatArray, progress: Progress | None = None
 ) -> IntArray:
     """Count at points one by one."""
     found, start, size = np.empty(x.size, np.int64), 0, _BATCH
@@ -252,7 +245,7 @@ def _counted(
 
 def _chart(affine: Affine, x: FloatArray, y: FloatArray) -> IntArray:
     """Return the counts of a chart with ascending axes."""
-    with _progress(x.size * y.size, " points") as progress:
+    with Progress(x.size * y.size, "chart", " points") as progress:
         rows = _Rows.of(affine, float(x[x.size // 2]), float(y[y.size // 2]))
         if x.size * y.size <= _FEW or not rows.plain:
             across, up = _points(x, y)
@@ -267,7 +260,7 @@ def _points(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _filled(
-    affine: Affine, rows: _Rows, x: FloatArray, y: FloatArray, progress: tqdm
+    affine: Affine, rows: _Rows, x: FloatArray, y: FloatArray, progress: Progress
 ) -> IntArray:
     """Return the counts of a chart, row by row; doubtful points are counted one by one."""
     sides, levels = _ends(x, _OUTSIDE[0]), _ends(y, _OUTSIDE[1])

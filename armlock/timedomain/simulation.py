@@ -73,6 +73,12 @@ class DivergenceError(ArithmeticError):
 
 
 @njit()
+def _of(series: FloatArray, i: int) -> float:
+    """Return a sample of a series, or the number that stands for all samples."""
+    return float(series[np.uintp(i * (len(series) > 1))])
+
+
+@njit()
 def _delayed(phi: FloatArray, now: int, weights: Weights, i: int) -> float:
     """Return phi as it was one delay before row `now`; i is the sample of the delay."""
     first, shares = weights
@@ -117,9 +123,9 @@ def _compute(
     end = len(noise)
     for i in range(len(noise)):
         now = len(phi) - len(noise) + i
-        n1, n2, given = added1[np.uintp(i)], added2[np.uintp(i)], noise[np.uintp(i)]
-        a1 = c1[np.uintp(i)] * _delayed(phi, now, arms[0], i) - n1
-        a2 = c2[np.uintp(i)] * _delayed(phi, now, arms[1], i) - n2
+        n1, n2, given = _of(added1, i), _of(added2, i), noise[np.uintp(i)]
+        a1 = _of(c1, i) * _delayed(phi, now, arms[0], i) - n1
+        a2 = _of(c2, i) * _delayed(phi, now, arms[1], i) - n2
         # x = given - predicted - now1 (x - a1) - now2 (x - a2), solved for x.
         x = (given + (now1 * a1 + now2 * a2) - predicted) * inverse
         u1, u2 = x - a1, x - a2
@@ -377,7 +383,10 @@ class Simulation(Shown):
         output, done = np.empty(given.size), 0
         while done < given.size and not self._diverged:
             part = tuple(
-                np.require(series[done : done + _TOGETHER], requirements=["C", "W"])
+                np.require(
+                    series[done : done + _TOGETHER] if series.size > 1 else series,
+                    requirements=["C", "W"],
+                )
                 for series in inputs
             )
             computed = self._advance(part)
@@ -415,7 +424,7 @@ class Simulation(Shown):
         return phi[known : known + end]
 
     def _series(self, name: str, value: npt.ArrayLike, like: FloatArray | None) -> FloatArray:
-        """Return a finite series, or a number or a series in the shape of another one."""
+        """Return a finite series in the shape of another one, or of one number for all."""
         array = np.asarray(finite_series(name, value, *([1] if like is None else [0, 1])))
         if like is None:
             return array
@@ -424,7 +433,7 @@ class Simulation(Shown):
                 f"{name} must be a number or have the shape of noise, {like.shape}; got "
                 f"{array.shape}"
             )
-        return array if array.ndim else np.broadcast_to(array, like.shape)
+        return np.atleast_1d(array)
 
     def _arms(self, size: int) -> tuple[Weights, Weights]:
         """Return the delays of both arms during the next samples."""
