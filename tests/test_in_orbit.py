@@ -38,7 +38,8 @@ def chapter():
         cells = json.loads((ROOT / "notebooks" / f"{notebook}.ipynb").read_text("utf-8"))
         source |= {cell["id"]: "".join(cell["source"]) for cell in cells["cells"]}
     names: dict[str, Any] = {}
-    for part in ("read", "curves", "table", "loops", "range", "days", "unstable-times"):
+    parts = ("read", "curves", "largest", "table", "loops", "range", "days", "unstable-times")
+    for part in parts:
         exec(source[f"orbits-{part}"], names)
     for part in ("imports", "formulas"):
         exec(source[f"tdi-{part}"], names)

@@ -317,13 +317,13 @@ function armlockPages() {
         this.rough = false;
         this.respond();
       }
-      this.asks(this.slow, design, told, point, () => {
+      this.asks(this.slow, design, told, point, kind => {
         const weakest = weakestOf(design.breaks);
         this.chart.broken = design.breaks.flatMap((one, k) => one?.size > 0 && one.size < Infinity
           ? [{ place: WAYS[k].map(v => 1 + v * one.size), weakest: one.size === weakest?.size }] : []);
         this.heard();
         // A margin may lie beyond what is drawn.
-        if (told === this.design?.told) this.respond(); else this.draw();
+        if (kind === "margins" && told === this.design?.told) this.respond(); else this.draw();
         this.write();
       });
     }
@@ -381,8 +381,8 @@ function armlockPages() {
           asked: breaks.every(one => one !== undefined) };
         pinned.response = this.responseOf(pinned, point);
         this.beside ||= new Desk([...TOLD, ...BREAKS]);
-        this.asks(this.beside, pinned, told, point, () => {
-          pinned.response = this.responseOf(pinned, point);
+        this.asks(this.beside, pinned, told, point, kind => {
+          if (kind === "margins") pinned.response = this.responseOf(pinned, point);
           this.draw();
           if (this.design) this.list();
         });
