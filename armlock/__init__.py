@@ -16,7 +16,9 @@ The calls that matter most:
 - ``critical_perturbation(loop, direction)`` is the distance from (1, 1) to instability.
 - ``varying_radius(loop)`` is how far c1 and c2 may vary in time; ``peak_gain(system)`` is the
   largest gain of a stable system.
-- ``rightmost_root(loop, c1, c2)`` is the root that decays slowest or grows fastest.
+- ``rightmost_root(loop, c1, c2)`` is the root that decays slowest or grows fastest;
+  ``characteristic_roots(loop, c1, c2, right_of=-0.1)`` are all roots right of a line.
+- ``stable_delays(system, z, longest=10.0)`` are the windows of one delay, with their counts.
 - ``control.tf([1], [10, 1]) * delay(3.0)`` is a system with a dead time. Systems are combined
   with ``+ - * / **`` and `feedback`, with any number of delays and of parameters such as
   ``parameter("kp")``; every function above takes them. `equation` stands for D = 0.
@@ -79,12 +81,18 @@ from armlock.stability.counts import (
 )
 from armlock.stability.dcurve import d_curve, d_curve_branches, d_curve_line
 from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
-from armlock.stability.roots import RootError, rightmost_root
+from armlock.stability.roots import (
+    CharacteristicRoots,
+    RootError,
+    characteristic_roots,
+    rightmost_root,
+)
 from armlock.stability.semidiscretization import (
     semi_discretization,
     spectral_radius,
     transition_matrix,
 )
+from armlock.stability.windows import stable_delays
 from armlock.systems import System, delay, equation, parameter, s
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
 from armlock.timedomain.responses import impulse_response, step_info, step_response
@@ -118,6 +126,7 @@ __all__ = [
     "UNCONFINED",
     "UNDECIDED",
     "AxisCrossings",
+    "CharacteristicRoots",
     "CommonArm",
     "Controller",
     "CountError",
@@ -143,6 +152,7 @@ __all__ = [
     "axis_crossings",
     "box_count",
     "buildable_loop",
+    "characteristic_roots",
     "critical_perturbation",
     "d_curve",
     "d_curve_branches",
@@ -170,6 +180,7 @@ __all__ = [
     "simulate",
     "spectral_radius",
     "stability_chart",
+    "stable_delays",
     "stable_half_differences",
     "state_space",
     "step_info",

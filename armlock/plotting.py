@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from armlock.stability.charts import StabilityChart
     from armlock.stability.dcurve import Branch, Line
     from armlock.stability.nyquist import NyquistCurve
+    from armlock.stability.roots import CharacteristicRoots
 
 #: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito). The colour
 #: cycle of armlock.mplstyle has the same.
@@ -174,6 +175,30 @@ def plot_line(line: Line, ax: Axes | None = None, **style: Any) -> Axes:
     foot = line.value * normal / (normal @ normal)
     along = foot + np.array([line.weight_y, -line.weight_x])
     ax.axline(tuple(foot), tuple(along), **{"color": ORANGE, "linestyle": "--", **style})
+    return ax
+
+
+# Roots --------------------------------------------------------------------------------------
+
+
+def plot_roots(roots: CharacteristicRoots, ax: Axes | None = None, **style: Any) -> Axes:
+    """Draw characteristic roots, their line, and the region right of it.
+
+    The region is shaded: it holds no other roots. The style is that of
+    `matplotlib.axes.Axes.plot`.
+    """
+    ax = plt.gca() if ax is None else ax
+    ax.plot(
+        roots.values.real,
+        roots.values.imag,
+        **{"color": BLUE, "linestyle": "none", "marker": "x", **style},
+    )
+    right = max(ax.get_xlim()[1], 0.0)
+    ax.axvspan(roots.right_of, right, color=STABLE, alpha=0.3, linewidth=0.0)
+    ax.axvline(roots.right_of, color=ORANGE, linewidth=0.8)
+    ax.axvline(0.0, color="black", linewidth=0.6)
+    ax.set(xlabel="real part of $s$ (rad/s)", ylabel="imaginary part of $s$ (rad/s)")
+    ax.set_xlim(right=right)
     return ax
 
 

@@ -38,7 +38,7 @@ from armlock.checks import (
 )
 from armlock.controllers import Controller, check_system, rational
 from armlock.engine.chain import NOW, Delay, Lag
-from armlock.engine.polynomials import collected, exact, order, polynomial, rounded
+from armlock.engine.polynomials import Polynomial, collected, exact, order, polynomial, rounded
 from armlock.engine.statespace import ROUNDED, Lowest, settled
 
 if TYPE_CHECKING:
@@ -89,7 +89,6 @@ _ROUNDING = 2.0**-51
 _INSTEAD = {
     "plot_phase": "control.bode_plot(L.frequency_response(omega))",
     "response": "armlock.nyquist(L, omega_max=...).plot()",
-    "poles": "armlock.rightmost_root(L), or unstable_roots(L, right_of=...),",
     "dcgain": "L(0)",
 }
 # Largest power of a system, and longest text of one.
@@ -746,6 +745,40 @@ class System:
         hint = _INSTEAD.get(name)
         what = f"; write {hint} for a system L with delays" if hint else ""
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{what}")
+
+    def poles(self) -> ComplexArray:
+        """Return the poles of a system without delays, in rad/s, as python-control has them.
+
+        Those of its loop are ``characteristic_roots(system, right_of=...)``.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the system has delays, or is an equation, or a parameter has no nominal value.
+        """
+        return self._roots_of("poles", self.denominator)
+
+    def zeros(self) -> ComplexArray:
+        """Return the zeros of a system without delays, in rad/s, as python-control has them.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As `poles`.
+        """
+        return self._roots_of("zeros", self.numerator)
+
+    def _roots_of(self, what: str, part: Sum) -> ComplexArray:
+        """Return the roots of numerator or denominator, with nominal parameters."""
+        if self.is_equation or any(self.numerator.lags | self.denominator.lags):
+            raise ValueError(
+                f"{what} are those of a system without delays, got {self!r:.200}: write "
+                "armlock.characteristic_roots(L, right_of=...), which has the roots of an "
+                "equation, or of the closed loop of L"
+            )
+        given = self.given((), {}).items()
+        values = {k: Sum.of(fmpq_poly([exact_number(k, v)])) for k, v in given}
+        return np.array(Polynomial.of(part.put(values).whole()).roots, np.complex128)
 
     def isdtime(self, strict: bool = False) -> bool:
         """Whether time is discrete: it is not. So python-control's plots take the system."""

@@ -36,6 +36,7 @@ SHAPE: dict[str, Any] = {"zeros": [], "poles": [-1.0], "gain": 1.0}
 NOISE: dict[str, Any] = {"seed": 1, "sample_rate": 10.0}
 
 # A call of everything that takes arguments, with sensible ones.
+Z = armlock.delay(1.0)
 CALLS: dict[Callable[..., object], dict[str, Any]] = {
     HayesEquation: {"tau": 1.0},
     SingleArm: {"gain": 1.0, "tau1": 1.0},
@@ -57,6 +58,8 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.unstable_roots: {"system": ARMS} | POINT,
     armlock.stability_chart: {"system": ARMS, "c1": [1.0], "c2": [1.0]},
     armlock.rightmost_root: {"system": ARMS} | POINT,
+    armlock.characteristic_roots: {"system": ARMS, "right_of": 0.1} | POINT,
+    armlock.stable_delays: {"system": equation(1 + Z), "z": Z, "longest": 3.0},
     armlock.d_curve: {"system": ARMS, "omega": 1.0},
     armlock.d_curve_line: {"system": ARMS},
     armlock.d_curve_branches: {"system": ARMS, "omega_max": 1.0, "points_per_turn": 24},

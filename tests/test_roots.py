@@ -14,19 +14,25 @@ from scipy.optimize import brentq
 from scipy.special import lambertw
 
 from armlock import (
+    BOUNDARY,
     CommonArm,
+    CountError,
     DualArm,
     HayesEquation,
     Loop,
     RootError,
     SingleArm,
     System,
+    characteristic_roots,
     delay,
     equation,
     paper_loop,
     parameter,
     rightmost_root,
     s,
+    semi_discretization,
+    state_space,
+    transition_matrix,
     unstable_roots,
 )
 from armlock.loops import flight_loop
@@ -336,3 +342,152 @@ def test_coefficients_whose_sums_are_no_floats_are_refused(system, ask):
     for c1 in (0.9, [0.9, 0.5]):
         with np.errstate(all="raise"), pytest.raises(ValueError, match=r"below 1e\+300"):
             ask(system, c1, 1e308)
+
+
+# all roots right of a line ------------------------------------------------------------------
+
+
+def collocated(parts, number=70):
+    """Roots of x' = sum of A_k x(t - h_k), from Chebyshev's collocation of its generator."""
+    longest, size = max(parts), len(parts[0])
+    node = np.cos(np.pi * np.arange(number + 1) / number)
+    weight = np.r_[2.0, np.ones(number - 1), 2.0] * (-1.0) ** np.arange(number + 1)
+    apart = np.subtract.outer(node, node) + np.eye(number + 1)
+    slope = np.outer(weight, 1.0 / weight) / apart
+    slope -= np.diag(slope.sum(axis=1))
+    whole = np.kron(2.0 / longest * slope, np.eye(size))
+    whole[:size] = 0.0
+    for h, matrix in parts.items():
+        at = 1.0 - 2.0 * h / longest
+        # Lagrange's polynomials at the delay, by barycentric weights.
+        off = at - node
+        hit = np.abs(off) < 1e-14
+        share = hit.astype(float) if hit.any() else (1.0 / weight / off)
+        share = share / share.sum()
+        whole[:size] += np.kron(share, matrix)
+    return np.linalg.eigvals(whole)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_all_roots_right_of_a_line_are_those_of_a_collocation(seed):
+    rng = np.random.default_rng([68, seed])
+    size = int(rng.integers(1, 5))
+    a = {h: rng.normal(size=(size, size)) for h in (0.0, *rng.uniform(0.2, 2.0, 2).round(3))}
+    expected = collocated(a)
+    expected = expected[np.argsort(-expected.real)]
+    # A line between two roots, not too far left for the collocation.
+    gaps = -np.diff(expected.real[:25])
+    k = int(np.argmax(gaps[8:])) + 8
+    line = float(expected.real[k] - 0.5 * gaps[k])
+    system = state_space({h: m.tolist() for h, m in a.items()})
+    found = characteristic_roots(system, right_of=line)
+    assert len(found) == k + 1
+    assert (np.diff(found.values.real) <= 0.0).all()
+    assert found.values[0] == rightmost_root(system)
+    for root in expected[: k + 1]:
+        assert np.abs(found.values - root).min() < 1e-6 * (1.0 + abs(root))
+
+
+def test_the_chain_of_an_arm_is_that_of_lambert_and_none_is_missing():
+    found = characteristic_roots(HayesEquation(), 0.0, -1.2, right_of=-3.0)
+    expected = independent.hayes_roots(0.0, -1.2, branches=6)
+    expected = expected[expected.real > -3.0]
+    assert len(found) == len(expected) == 8
+    for root in expected:
+        assert np.abs(found.values - root).min() < 1e-13
+    assert found.values == pytest.approx(np.conj(found.values.reshape(4, 2)[:, ::-1]).ravel())
+    assert found.time_constant[0] == pytest.approx(-1.0 / found.values[0].real)
+    assert "8 roots right of Re s = -3" in str(found)
+    ax = found.plot()
+    assert len(np.asarray(ax.lines[0].get_ydata())) == 8
+
+
+def test_hundreds_of_roots_of_a_flight_loop_are_all_listed():
+    begun = time.process_time()
+    loop = flight_loop()
+    found = characteristic_roots(loop, right_of=-1e-3)
+    assert time.process_time() - begun < 20.0
+    assert len(found) == unstable_roots(loop, right_of=-1e-3) == 623
+    assert found.values[0] == rightmost_root(loop)
+    # The line of fewer roots, too.
+    line = 0.5 * (found.values[100].real + found.values[103].real)
+    fewer = characteristic_roots(loop, right_of=line)
+    np.testing.assert_array_equal(fewer.values, found.values[: len(fewer)])
+
+
+@pytest.mark.parametrize("number", [2, 3, 5])
+def test_a_multiple_root_stands_in_the_list_as_often_as_it_is_one(number):
+    multiple = (s + 1) ** number * (s + 2 + 0.1 * delay(1.0))
+    found = characteristic_roots(equation(multiple), right_of=-1.9)
+    assert found.values == pytest.approx([-1.0] * number, rel=1e-12)
+    assert (found.radius < 1e-9).all()
+
+
+def test_a_double_root_on_the_axis_that_rounding_splits_is_listed():
+    """3 pi j, twice, but for the rounding of pi: NEP-PACK's `dep_double`."""
+    pi = np.pi
+    d = 8.0 + 5.0 * pi
+    a1, a2 = 0.4 * (65 * pi + 32) / d, 9 * pi**2 * (13 + 5 * pi) / d
+    b1, b2 = (260 * pi + 128 + 225 * pi**2) / (10 * d), 45 * pi**2 / d
+    a3, b3 = 64.8 * pi**2 * (5 * pi + 4) / d, 8.1 * pi**2 * (40 * pi + 32 + 25 * pi**2) / d
+    late = (b1 * s**2 + b2 * s + b3) * delay(1.0)
+    double = equation(s**3 + a1 * s**2 + a2 * s + a3 + late)
+    assert unstable_roots(double) == BOUNDARY
+    found = characteristic_roots(double, right_of=-0.02).values
+    assert found.size == unstable_roots(double, right_of=-0.02) == 8
+    near = np.abs(found - 3j * pi) < 1e-6
+    assert near.sum() == 2
+
+
+def test_lightly_damped_modes_and_slow_poles_are_told_apart():
+    plant = 1
+    for omega in 0.05 * (1.0 + 1e-3 * np.arange(4)):
+        plant = plant * control.tf([omega**2], [1.0, 2e-6 * omega, omega**2])
+    modes = 1e-10 * System.of(plant) * delay(3.0)
+    slow = 0.5 * delay(3.0) / (1 + s / 5e-6) ** 5
+    for loop, number, off in ((modes, 8, 1e-3), (slow, 5, 1.5e-5)):
+        line = rightmost_root(loop).real - off
+        found = characteristic_roots(loop, right_of=line).values
+        assert found.size == unstable_roots(loop, right_of=line) == number
+        with mpmath.workdps(60):
+            for root in found:
+                value, next_to = (independent_value(loop, root * (1 + e)) for e in (0, 1e-9))
+                # A step of Newton's method is far shorter than the way to another root.
+                assert abs(value / (next_to - value)) * 1e-9 < 1e-8
+
+
+def independent_value(loop, at):
+    """D of an expression, exactly from its terms."""
+    at, total = mpmath.mpc(at), mpmath.mpf(0)
+    for part in (loop.numerator, loop.denominator):
+        for (lag, _), p in part.terms.items():
+            c = [mpmath.mpf(int(v.p)) / int(v.q) for v in p.coeffs()]
+            late = mpmath.mpf(int(lag.time.p)) / int(lag.time.q)
+            total += mpmath.polyval(c, at, asc=True) * mpmath.exp(-late * at)
+    return total
+
+
+def test_roots_without_a_delay_and_those_of_a_map():
+    plain = equation((s + 1) ** 2 * (s + 3) * (s**2 + 2 * s + 5))
+    found = characteristic_roots(plain, right_of=-2.0)
+    assert found.values.tolist() == [-1.0, -1.0, -1 + 2j, -1 - 2j]
+    sampled = semi_discretization(CommonArm(1.0, 2.0, 1.0), 0.1)
+    matrix = transition_matrix(CommonArm(1.0, 2.0, 1.0), 0.5, 0.9, step=0.1)
+    expected = np.linalg.eigvals(matrix)
+    found = characteristic_roots(sampled, 0.5, 0.9, right_of=-5.0)
+    expected = expected[np.abs(expected) > np.exp(-0.5)]
+    assert len(found) == expected.size
+    for z in np.exp(0.1 * found.values):
+        assert np.abs(expected - z).min() < 1e-9
+
+
+def test_what_is_no_list_of_roots_is_refused_with_its_reason():
+    with pytest.raises(ValueError, match=r"^right_of must lie right of the limit"):
+        characteristic_roots(paper_loop(), right_of=-1e-4)
+    with pytest.raises(ValueError, match=r"^right_of must leave at most 10000 roots"):
+        characteristic_roots(HayesEquation(tau=1e4), 0.0, -4.0, right_of=-1e-5)
+    with pytest.raises(CountError, match="lies on the line Re s = 0"):
+        characteristic_roots(HayesEquation(), 0.0, -np.pi / 2, right_of=0.0)
+    with pytest.raises(ValueError, match=r"^parameters must be numbers"):
+        characteristic_roots(HayesEquation(), [0.0, 1.0], -1.0, right_of=0.0)
+    assert len(characteristic_roots(CommonArm(), right_of=0.0)) == 0

@@ -83,7 +83,7 @@ def decided(what: str, point: FloatArray) -> Iterator[None]:
         raise CountError(f"{what}{place(point)}: {error}", point[None]) from None
 
 
-def _count_exactly(n: Function, m: Function, right_of: float = 0.0) -> int:
+def count_exactly(n: Function, m: Function, right_of: float = 0.0) -> int:
     """Count the roots of N + M = 0, of a loop those of the closed loop."""
     function = n + m
     # No root cancels where D has none at s = 0.
@@ -112,7 +112,7 @@ def count_points(affine: Affine, points: FloatArray) -> IntArray:
         found[start + here[_degree_falls(affine, points[start + here])]] = _EXACTLY
     for i in np.flatnonzero(found == _EXACTLY):
         try:
-            found[i] = _count_exactly(*present(*affine.quotient(*points[i].tolist())))
+            found[i] = count_exactly(*present(*affine.quotient(*points[i].tolist())))
         except UndecidedError:
             found[i] = UNDECIDED
     return found
@@ -232,7 +232,7 @@ def unstable_roots(
     found = np.empty(len(points), np.int64)
     for i, point in enumerate(points):
         try:
-            found[i] = _count_exactly(*quotient_at(system, point.tolist()), right_of)
+            found[i] = count_exactly(*quotient_at(system, point.tolist()), right_of)
         except UndecidedError as error:
             if len(points) == 1:
                 raise CountError(f"no count{place(point)}: {error}", points) from None

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import flint
@@ -18,17 +19,17 @@ import numpy.typing as npt
 from flint import acb, acb_poly, arb, fmpq, fmpq_poly
 
 from armlock.affine import quotient_at
-from armlock.checks import ComplexArray, FloatArray
+from armlock.checks import ComplexArray, FloatArray, real_number
 from armlock.engine import chain, decide, inclusion
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, Space, common_zeros
 from armlock.engine.polynomials import enclosed_roots, exact, order
-from armlock.stability.counts import at_points
+from armlock.stability.counts import CountError, at_points, count_exactly, decided, place
 from armlock.systems import System
 
 if TYPE_CHECKING:
-    pass
+    from matplotlib.axes import Axes
 
 # How far right of the root that is returned no other one lies: the first share of abs(s), or of
 # one over the longest delay, if so fine a count is decided in so few steps. Otherwise it is the
@@ -106,6 +107,12 @@ class _Disc(NamedTuple):
     def size(self) -> int:
         """How many roots there are in it and its conjugate."""
         return self.number * (2 if self.has_conjugate else 1)
+
+    @property
+    def roots(self) -> list[complex]:
+        """The centre as often as there are roots in the disc, and its conjugate."""
+        pair = [self.root, self.root.conjugate()] if self.has_conjugate else [self.root]
+        return pair * self.number
 
     def meets(self, other: _Disc) -> bool:
         """Whether two discs may overlap."""
@@ -407,8 +414,7 @@ class _Search:
             keep(candidates, [1])
             for _ in range(_ROUNDS):
                 # Newton's method for F over the factors of what is known leads elsewhere.
-                known = np.array([disc.root for disc in found for _ in range(disc.number)])
-                known = np.concatenate((known, known[known.imag != 0.0].conj()))
+                known = np.array([s for disc in found for s in disc.roots], np.complex128)
                 starts = np.concatenate((self.poles, known, [line]))
                 starts = starts[np.argsort(np.abs(starts - line))][: _MOST_STARTS // 6]
                 around = 0.3 * np.abs(starts) + 1e-9 * self.unit
@@ -560,6 +566,181 @@ def _searched(function: Function, common: int) -> complex:
     raise RootError(
         f"no rightmost root could be certified{why}; the best candidate is {best}", best
     )
+
+
+@dataclass(frozen=True, eq=False)
+class CharacteristicRoots:
+    """All characteristic roots right of a line; `print` writes them as a table.
+
+    Attributes
+    ----------
+    values : complex array, shape (n,)
+        In rad/s, by falling real part, with conjugates. A root of multiplicity m stands there m
+        times, and so does the centre of a cluster of m roots that are not told apart.
+    radius : float array, shape (n,)
+        The disc of this radius around a value, but for rounding of the value, holds as many
+        roots as the value stands there. In rad/s; far below rounding except for clusters.
+    right_of : float
+        The line Re s, in rad/s.
+
+    Examples
+    --------
+    >>> from armlock import HayesEquation, characteristic_roots
+    >>> roots = characteristic_roots(HayesEquation(tau=1.0), 0.0, -1.2, right_of=-2.0)
+    >>> print(roots.values.round(4))
+    [-0.1905+1.4392j -0.1905-1.4392j -1.8769+7.6122j -1.8769-7.6122j]
+    >>> print(roots.damping[0].round(4), roots.time_constant[0].round(4))
+    0.1312 5.2504
+    """
+
+    values: ComplexArray
+    radius: FloatArray
+    right_of: float
+
+    def __len__(self) -> int:
+        """Return the number of roots."""
+        return self.values.size
+
+    @property
+    def damping(self) -> FloatArray:
+        """Damping ratios, -Re s / |s|; nan at s = 0."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(-self.values.real / np.abs(self.values))
+
+    @property
+    def time_constant(self) -> FloatArray:
+        """Time constants -1 / Re s in s, negative of roots that grow."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(-1.0 / self.values.real)
+
+    def __str__(self) -> str:
+        """List real part, frequency, damping ratio and time constant, pairs once."""
+        lines = [f"{len(self)} roots right of Re s = {self.right_of:g} rad/s"]
+        lines.append("  real part    frequency  damping  time constant")
+        lines.append("      rad/s        rad/s                       s")
+        rows = zip(self.values, self.damping, self.time_constant, strict=True)
+        for s, damping, time in rows:
+            if s.imag >= 0.0:
+                lines.append(f"{s.real:11.4e}  {s.imag:11.4e}  {damping:7.4f}  {time:13.4e}")
+        return "\n".join(lines)
+
+    def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
+        """Draw the roots, the line, and the region right of it, in which there are no others.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current ones by default.
+        **style
+            As `matplotlib.axes.Axes.plot` takes it.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        from armlock.plotting import plot_roots
+
+        return plot_roots(self, ax, **style)
+
+
+def characteristic_roots(
+    system: System, *values: npt.ArrayLike, right_of: float, **numbers: npt.ArrayLike
+) -> CharacteristicRoots:
+    """Return all characteristic roots right of a line, certified: none is missing.
+
+    Parameters
+    ----------
+    system : System
+        The open loop L, an equation, or a map, as `rightmost_root` takes it.
+    *values, **numbers : float, optional
+        The parameters, in the order of their first use or by name; nominal ones by default.
+    right_of : float
+        The line Re s in rad/s.
+
+    Returns
+    -------
+    CharacteristicRoots
+        By falling real part, multiplicity included. Of a map those with abs(Im s) of at most
+        pi over the step; roots of the map at z = 0 have no s.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `unstable_roots`, if there are more than 10 000 roots, or if the line does not lie
+        right of the limit of a neutral chain.
+    CountError
+        If a root lies on the line, or nearer to it than rounding can tell.
+    RootError
+        If not all of them are found; its `estimate` are those that are.
+
+    See Also
+    --------
+    armlock.rightmost_root : the first of them, without a line.
+
+    Notes
+    -----
+    How many there are is the certified count, see `unstable_roots`. Candidates from Newton's
+    method are enclosed in discs that hold a known number of roots, until the sum of these
+    numbers is the count (Lemma 25).
+
+    Examples
+    --------
+    >>> from armlock import CommonArm, characteristic_roots
+    >>> print(characteristic_roots(CommonArm(), right_of=-0.004))
+    4 roots right of Re s = -0.004 rad/s
+      real part    frequency  damping  time constant
+          rad/s        rad/s                       s
+    -5.8964e-04   3.0655e-01   0.0019     1.6960e+03
+    -2.2894e-03   6.1342e-01   0.0037     4.3679e+02
+    """
+    sigma = real_number("right_of", right_of)
+    system, points, shape = at_points(system, values, numbers)
+    if shape:
+        raise ValueError(f"parameters must be numbers, got arrays of the shape {shape}")
+    n, m = quotient_at(system, points[0].tolist())
+    discs = _all_right_of(n, m, sigma, points[0])
+    found = [(s, float(disc.radius)) for disc in discs for s in disc.roots]
+    found.sort(key=lambda pair: (-pair[0].real, abs(pair[0].imag), -pair[0].imag))
+    return CharacteristicRoots(
+        np.array([s for s, _ in found], np.complex128),
+        np.array([r for _, r in found], np.float64),
+        sigma,
+    )
+
+
+def _all_right_of(n: Function, m: Function, sigma: float, point: FloatArray) -> list[_Disc]:
+    """Return discs of all roots of a loop right of a line, or raise."""
+    function, common = n + m, common_zeros(n, m)
+    discs = _of_polynomial(function, common)
+    if discs is not None:
+        on_line = any(abs(disc.centre.real - sigma) <= disc.radius for disc in discs)
+        number = sum(disc.size for disc in discs if disc.centre.real > sigma)
+        number = BOUNDARY if on_line else number
+    else:
+        with decided("no roots", point):
+            number = count_exactly(n, m, sigma)
+    if number == UNCONFINED:
+        raise ValueError(
+            f"right_of must lie right of the limit of the neutral chain, got {sigma:g}: "
+            "infinitely many roots may lie right of it"
+        )
+    if number == BOUNDARY:
+        raise CountError(
+            f"no roots{place(point)}: one lies on the line Re s = {sigma:g}, or nearer to it "
+            "than rounding can tell",
+            point[None],
+        )
+    if number > _MOST_ROOTS:
+        raise ValueError(
+            f"right_of must leave at most {_MOST_ROOTS} roots, got {sigma:g} with {number}"
+        )
+    if discs is not None:
+        return [disc for disc in discs if disc.centre.real > sigma]
+    found = _Search(function, common).right_of(sigma, number) if number else []
+    if (size := sum(disc.size for disc in found)) != number:
+        estimate = np.array([s for disc in found for s in disc.roots])
+        raise RootError(f"{size} of {number} roots right of {sigma:g} are found", estimate)
+    return found
 
 
 def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> Any:
