@@ -1,4 +1,4 @@
-"""The code of the pages of recipes and of any loop runs, and prints what the pages show."""
+"""The code of the pages runs, and prints what the pages show."""
 
 import os
 import re
@@ -31,7 +31,7 @@ def run(folder, text, packages=()):
     return done.stdout
 
 
-@pytest.mark.parametrize("name", ["any_loop", "recipes"])
+@pytest.mark.parametrize("name", ["any_loop", "recipes", "beside"])
 def test_a_page_prints_what_it_shows(tmp_path, name):
     run(tmp_path, (BOOK / f"{name}.md").read_text("utf-8").partition(APART)[0])
 
