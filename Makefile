@@ -7,7 +7,10 @@ PY := $(VENV)/bin/python
 READY := $(VENV)/.complete
 EXECUTED := build/executed/.complete
 BOOK := build/html/index.html
-NOTEBOOKS := $(wildcard notebooks/*.ipynb)
+# In the order of the last build's times, or of those that `make format` has kept.
+LONGEST_FIRST = $(firstword $(wildcard build/longest_first.txt) book/longest_first.txt)
+LISTED := $(wildcard $(addprefix notebooks/,$(shell cat $(LONGEST_FIRST))))
+NOTEBOOKS := $(LISTED) $(filter-out $(LISTED),$(wildcard notebooks/*.ipynb))
 
 # What the reader has set up for other projects must not reach this one.
 export PYTHONNOUSERSITE := 1
@@ -60,14 +63,13 @@ $(READY): environment.txt book/kernel.json
 	@echo "$(CURDIR)" > $@
 
 # nbmake runs copies of the notebooks for the tests and for the book, the longest first.
-LONGEST := $(wildcard notebooks/09_* notebooks/13_* notebooks/15_*)
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 # A progress bar, which a slow machine would show, is no part of a page.
 execute = export TQDM_DISABLE=1 ARMLOCK_FIGURES=$(CURDIR)/$(1); \
 	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(2:notebooks/%=build/executed/%) && \
 	$(PY) tools/collect_figures.py build/executed $(1) build/cache
 execute-all = rm -rf $(1) build/executed; cp -R notebooks build/executed && \
-	$(call execute,$(1),$(LONGEST) $(NOTEBOOKS))
+	$(call execute,$(1),$(NOTEBOOKS))
 
 # If notebooks alone have changed, only these run again.
 $(EXECUTED): $(READY) $(call sources,armlock book/companion notebooks) book/claims.toml
@@ -151,11 +153,12 @@ lint: $(READY) ## Check style, types, stripped notebooks, and what is written by
 	$(PY) -m uv pip install --dry-run --quiet --no-index --no-deps --no-build --python $(PY) -r $(REQUIRED)
 	$(PY) tools/write_codecheck.py --check
 
-format: $(READY) ## Format the code, strip the notebooks, list their figures
+format: $(READY) ## Format the code, strip the notebooks, list their figures and their order
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 	$(PY) -m nbstripout --keep-id $(NOTEBOOKS)
 	$(PY) tools/write_codecheck.py
+	@if [ -f build/longest_first.txt ]; then cp build/longest_first.txt book; fi
 
 lock: $(READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newest versions)
 	$(PY) -m uv pip compile $(REQUIRED) --universal --python-version 3.11 \

@@ -6,7 +6,8 @@ Each figure carries its data and an SVG: `book.companion.figures` extends IPytho
 become the files NAME.csv and NAME.svg in the folder FIGURES; `fig-NAME` is the name in the
 metadata of the cell. The book's build takes a notebook from CACHE if code and metadata of its
 cells are the same. So the times that nbmake notes in the metadata are left out; the page on the
-book's status shows their sum.
+book's status shows their sum. Beside CACHE the names of the notebooks are written to
+`longest_first.txt`, by these sums: in this order the next build runs them.
 """
 
 import shutil
@@ -65,14 +66,17 @@ def main() -> None:
     executed, figures, cached = map(Path, sys.argv[1:])
     figures.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(cached, ignore_errors=True)
-    cache = get_cache(cached)
+    cache, times = get_cache(cached), {}
     for path in sorted(executed.glob("*.ipynb")):
         notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
         for cell in notebook.cells:
             take_figures(cell, figures)
             join_streams(cell)
-        data = {"execution_seconds": sum(map(seconds, notebook.cells))}
+        times[path.name] = sum(map(seconds, notebook.cells))
+        data = {"execution_seconds": times[path.name]}
         cache.cache_notebook_bundle(CacheBundleIn(notebook, str(path), data=data))
+    order = sorted(times, key=lambda name: -times[name])
+    (cached.parent / "longest_first.txt").write_text("\n".join(order) + "\n", "utf-8")
 
 
 if __name__ == "__main__":
