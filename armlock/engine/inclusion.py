@@ -872,10 +872,48 @@ def _aim(goal: int, f: complex, g: complex, radius: float, omega: float) -> tupl
     return level, ((angle if angle >= 0.0 else angle + 2.0 * np.pi) - half) / omega
 
 
+@_inlined
+def _evaluate(functions: Functions, omega: float, work: Workspace) -> None:
+    """Write functions at j omega into `work.f`, all times one positive number."""
+    space, top = functions.space, 0
+    for k in range(space.delays.size):
+        phase, _ = _phase(space.delays[k], space.tails[k], omega)
+        half = np.sin(0.5 * phase)
+        work.turn[k, 0] = -2.0 * half * complex(half, np.cos(0.5 * phase))
+    for k in range(space.scale.size):
+        work.factor[k] = 1.0 / np.sqrt(space.scale[k] * space.scale[k] + omega * omega)
+    for j in range(space.lead.size):
+        p, shift = complex(space.lead[j], 0.0), 0
+        for k in range(space.scale.size):
+            by = work.factor[k]
+            if space.present[j, k]:
+                root = space.roots[j, k]
+                p *= complex(-root.real * by, (omega - root.imag) * by)
+            else:
+                p *= by
+            size = abs(p.real) + abs(p.imag)
+            if size > _HUGE or 0.0 < size < 1.0 / _HUGE:
+                p *= 1.0 / _HUGE if size > 1.0 else _HUGE
+                shift += 1 if size > 1.0 else -1
+        work.p[j, 0], work.shift[j] = p, shift
+        top = shift if j == 0 else max(top, shift)
+    for f in range(work.f.shape[0]):
+        total = 0.0j
+        for j in range(space.lead.size):
+            g = complex(functions.steady[f, j], 0.0)
+            for k in range(space.delays.size):
+                g += functions.delayed[f, j, k] * work.turn[k, 0]
+            p = work.p[j, 0]
+            if work.shift[j] != top:
+                p *= _HUGE ** float(max(work.shift[j] - top, -2))
+            total += p * g
+        work.f[f, 0, 0] = total
+
+
 @_inner
 def _measure(functions: Functions, goal: int, omega: float, spare: Workspace) -> Any:
     """`_aim` at a frequency."""
-    enclose(functions, omega, 0.0, spare)
+    _evaluate(functions, omega, spare)
     radius = 0.0
     for f in range(2, spare.f.shape[0]):
         radius += abs(spare.f[f, 0, 0])
