@@ -8,32 +8,32 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pytest
+from matplotlib import pyplot as plt
 
 BOOK = Path(__file__).parents[1] / "book"
 #: A recipe with packages that the environment does not hold.
 APART = "## From the locked laser to TDI"
 
 
-def run(folder, text, packages=()):
-    """Run the code of a page in one process, and compare what it prints with the page."""
-    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    assert max(map(len, "\n".join(blocks).splitlines())) <= 77  # what a page has room for
-    shown = "".join(re.findall(r"```text\n(.*?)```", text, re.DOTALL))
-    (folder / "page.py").write_text("\n\n".join(blocks))
-    command = [sys.executable, "-W", "error", "page.py"]
-    environment = {**os.environ, "MPLBACKEND": "agg"}
-    environment["PYTHONPATH"] = os.pathsep.join(map(str, packages))
-    done = subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300
+def blocks(text):
+    """Return the code of a page, and what the page says that it prints."""
+    code, shown = (
+        re.findall(rf"```{kind}\n(.*?)```", text, re.DOTALL) for kind in ("python", "text")
     )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == shown
-    return done.stdout
+    assert max(map(len, "\n".join(code).splitlines())) <= 77  # what a page has room for
+    return "\n\n".join(code), "".join(shown)
 
 
 @pytest.mark.parametrize("name", ["any_loop", "recipes", "beside"])
-def test_a_page_prints_what_it_shows(tmp_path, name):
-    run(tmp_path, (BOOK / f"{name}.md").read_text("utf-8").partition(APART)[0])
+@pytest.mark.filterwarnings("error")
+def test_a_page_prints_what_it_shows(tmp_path, monkeypatch, capsys, name):
+    """The code has a namespace of its own, in the process of the tests: imports take long."""
+    code, shown = blocks((BOOK / f"{name}.md").read_text("utf-8").partition(APART)[0])
+    monkeypatch.chdir(tmp_path)
+    with plt.rc_context():
+        exec(compile(code, f"{name}.md", "exec"), {"__name__": "__main__"})
+    plt.close("all")
+    assert capsys.readouterr().out == shown
 
 
 def missing(package, pinned):
@@ -59,7 +59,15 @@ def test_the_locked_laser_goes_through_tdi_as_chapter_14_says(tmp_path):
         done = subprocess.run(command, capture_output=True, text=True, timeout=120)
         if done.returncode:
             pytest.skip(f"not installed: {wanted}: {done.stderr.strip().splitlines()[-1]}")
-    rows = run(tmp_path, text, [packages]).splitlines()[1:]
+    code, shown = blocks(text)
+    environment = {**os.environ, "MPLBACKEND": "agg", "PYTHONPATH": str(packages)}
+    command = [sys.executable, "-W", "error", "-c", code]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == shown
+    rows = shown.splitlines()[1:]
     assert len(rows) == 4
     for row in rows:
         found, formula, ratio, _, error = row.split()[3:]

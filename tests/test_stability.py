@@ -389,3 +389,11 @@ def test_charts_place_crossings_at_zero_exactly(system, monkeypatch):
     found = stability_chart(system, x, x).counts
     assert sum(counted) < x.size
     assert (found == unstable_roots(system, *np.meshgrid(x, x))).all()
+
+
+def test_a_chart_counts_its_doubtful_points_again():
+    """On whole numbers D(0) vanishes exactly, on tenths often nearly: each point by itself."""
+    whole = np.arange(-20.0, 21.0)
+    for x in (whole, whole / 10.0):
+        found = stability_chart(HayesEquation(), x, x).counts
+        assert (found == unstable_roots(HayesEquation(), *np.meshgrid(x, x))).all()
