@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from armlock import CommonArm, DualArm, compiled, unstable_roots
-from armlock.compiled import Plain
+from armlock.compiled import Plain, Progress, notice
 from armlock.engine import decide, inclusion
 
 MODULE = """
@@ -153,3 +153,13 @@ def test_what_plain_python_cannot_count_is_compiled(monkeypatch):
     monkeypatch.setattr(decide, "_uncompiled", used)
     assert unstable_roots(CommonArm(), 1.5, 1.5) > 0
     assert tried
+
+
+def test_a_progress_bar_does_not_count_compiling_as_work():
+    with Progress(10, "work", " points") as bar:
+        begun = bar.start_t
+        notice.seconds = 50.0
+        bar.update()
+        assert bar.start_t == begun + 50.0
+        bar.update()
+        assert bar.start_t == begun + 50.0

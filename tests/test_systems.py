@@ -303,6 +303,13 @@ def test_what_python_control_asks_for_names_the_call():
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         loop.nothing()
     assert not hasattr(loop, "__array__")
+    pair = control.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))
+    with pytest.raises(
+        ValueError, match=r"return_difference\(plant, \[k1 \* delay\(h\), k2\]\)"
+    ):
+        pair * delay(0.5)
+    with pytest.raises(ValueError, match='see the recipe "A digital controller"'):
+        control.tf([1], [1, -0.5], 0.1) * loop
 
 
 def test_the_package_shows_what_users_call():
