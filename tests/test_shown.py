@@ -14,11 +14,9 @@ from armlock import (
     DualArm,
     LaserNoise,
     Simulation,
-    SpectrumEstimator,
     amplitude_spectrum,
     axis_crossings,
     d_curve_branches,
-    d_curve_line,
     delay,
     first_crossing,
     flight_loop,
@@ -46,12 +44,10 @@ SHOWN: dict[str, tuple[Callable[[], Any], list[str]]] = {
     "peak": (lambda: peak_gain(LOOP.feedback()), ["dB", "rad/s"]),
     "radius": (lambda: varying_radius(paper_loop()), ["1.32136e-06", "rad/s"]),
     "crossing": (lambda: first_crossing(DualArm(), (1, 1), (1, 1), 3.0), ["t = 0.254"]),
-    "line": (lambda: d_curve_line(CommonArm()), ["1 x + 1 y = 2"]),
     "branch": (lambda: d_curve_branches(CommonArm(), 1.0)[0], ["omega", "rad/s"]),
     "orbits": (kepler, ["from day"]),
     "noise": (lambda: LaserNoise(1, 10.0), ["10 Hz", "30 per sqrt(Hz)"]),
     "simulation": (lambda: Simulation(CommonArm(), 10.0), ["0 samples"]),
-    "estimator": (lambda: SpectrumEstimator(1.0), ["1 Hz"]),
 }
 
 

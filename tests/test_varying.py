@@ -37,7 +37,7 @@ from armlock.affine import Affine
 from armlock.engine import decide
 from armlock.engine.decide import Family
 from armlock.engine.inclusion import TERM, VERTEX
-from armlock.engine.varying import spectral_factor
+from armlock.robustness.varying import spectral_factor
 from armlock.sensors import SignalMapping
 from tests.peaks import dense_peak, draw, pair, system_of
 

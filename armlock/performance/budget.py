@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import cycle
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -63,13 +63,6 @@ def free_running(frequency: FloatArray) -> FloatArray:
 def tdi_capability(frequency: FloatArray) -> FloatArray:
     """Return the laser noise in Hz/sqrt(Hz) that time-delay interferometry can remove."""
     return 300.0 * (1.0 + (3e-3 / frequency) ** 2)
-
-
-class Laser(Protocol):
-    """What knows its own density, such as `armlock.LaserNoise`."""
-
-    def asd(self, frequency: npt.ArrayLike, /) -> npt.ArrayLike:
-        """Return the density at a frequency in Hz."""
 
 
 #: Laser noises by name, as functions of the frequency in Hz.
@@ -162,7 +155,7 @@ class NoiseBudget(Shown):
         return ax
 
 
-def _density(laser: Callable[[FloatArray], npt.ArrayLike] | Laser, f: FloatArray) -> FloatArray:
+def _density(laser: Any, f: FloatArray) -> FloatArray:
     """Return the noise of a free laser in Hz/sqrt(Hz), or raise."""
     density = getattr(laser, "asd", laser)
     if not callable(density):
@@ -183,7 +176,7 @@ def noise_budget(
     loop: Loop,
     frequency: npt.ArrayLike,
     *,
-    laser: Callable[[FloatArray], npt.ArrayLike] | Laser = free_running,
+    laser: Any = free_running,
     shot: float = LEVELS.shot,
     clock: float = LEVELS.clock,
 ) -> NoiseBudget:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
@@ -15,7 +16,7 @@ from armlock.checks import FloatArray, broadcast_shape, real_array
 from armlock.compiled import Progress
 from armlock.stability.counts import CountError
 from armlock.systems import System
-from armlock.tables import Shown, Table, spread
+from armlock.tables import Shown, Table
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -30,9 +31,7 @@ class Many(Shown):
     Attributes
     ----------
     results : object array
-        The single results, and None where there is none.
-    reasons : object array of str
-        Why there is none, of the same shape; empty where there is one.
+        The single results, and the error where there is none.
 
     Examples
     --------
@@ -45,33 +44,34 @@ class Many(Shown):
     'loop must be stable, but it has 1 unstable r'
     """
 
-    results: npt.NDArray[np.object_]
-    reasons: npt.NDArray[np.object_]
+    results: npt.NDArray[Any]
+
+    @property
+    def reasons(self) -> Any:
+        """Why there is no result: text of the shape of `results`, empty where there is one."""
+        return self._each(lambda one: str(one) if isinstance(one, Exception) else "", object)
+
+    def _each(self, of: Callable[[Any], Any], kind: type) -> Any:
+        return np.vectorize(of, otypes=[kind])(self.results)
 
     def __getattr__(self, name: str) -> FloatArray:
         """Return a number of all results."""
-        if name.startswith("_") or name in ("results", "reasons"):
+        if name.startswith("_") or name == "results":
             raise AttributeError(f"'Many' object has no attribute {name!r}")
-        single = (one if name == "value" else getattr(one, name) for one in self._found())
-        found = np.full(self.results.shape, np.nan)
-        found[self.reasons == ""] = np.fromiter(single, float)
+
+        def number(one: Any) -> float:
+            failed = isinstance(one, Exception)
+            return np.nan if failed else one if name == "value" else getattr(one, name)
+
+        found: FloatArray = self._each(number, float)
         return found
 
-    def _found(self) -> list[Any]:
-        """Return the single results that there are."""
-        return [one for one in self.results.flat if one is not None]
-
     def _table(self) -> Table:
-        """Show how many results there are, between which numbers, and a reason."""
-        found = self._found()
+        """Show how many results there are, the first one, and a reason."""
+        found = [one for one in self.results.flat if not isinstance(one, Exception)]
         rows = [("results", f"{len(found)} of {self.results.size}")]
-        if found:
-            one: Any = {"value": found[0]} if isinstance(found[0], float) else found[0]
-            one = one if isinstance(one, dict) else getattr(one, "_asdict", lambda: vars(one))()
-            for name in (name for name, value in one.items() if isinstance(value, float)):
-                values = getattr(self, name)
-                rows.append((name, spread(values[~np.isnan(values)])))
-        rows += [("no result", str(reason)[:80]) for reason in self.reasons.flat if reason][:1]
+        rows += [("first", line) for line in repr(found[0]).splitlines()] if found else []
+        rows += [("no result", reason[:80]) for reason in self.reasons.flat if reason][:1]
         return Table("Many loops or points", rows)
 
 
@@ -83,44 +83,34 @@ def many(*, points: bool = True) -> Callable[[_Function], _Function]:
 
         @wraps(function)
         def call(*values: Any, **numbers: Any) -> Any:
-            first, *values_left = values or (numbers.pop(name, None),)
-            return each(first, values_left, numbers)
-
-        def each(first: Any, values: list[Any], numbers: dict[str, Any]) -> Any:
+            first, rest = values[0] if values else numbers.pop(name, None), values[1:]
             loops = first if isinstance(first, list) else [first]
-            given: dict[Any, Any] = dict(enumerate(values)) | numbers
-            arrays = _arrays(name, loops, given) if points else {}
+            given: dict[Any, Any] = dict(enumerate(rest)) | numbers
+            names = dict(enumerate(System.of(loops[0], name).parameters if loops else ()))
+            arrays = {
+                place: real_array(names.get(place, str(place)), value)
+                for place, value in given.items()
+                if points and isinstance(value, list | tuple | np.ndarray)
+            }
             if loops is not first and not any(one.ndim for one in arrays.values()):
-                return function(first, *values, **numbers)
+                return function(first, *rest, **numbers)
             which = np.arange(len(loops)) if loops is first else np.array(0)
-            names = ("the list of loops", *map(str, arrays))
-            shape = broadcast_shape(names, (which, *arrays.values()))
-            every: Any = np.broadcast_arrays(which, *arrays.values(), np.empty(shape))
-            results, reasons = np.full(shape, None, object), np.full(shape, "", object)
-            with Progress(results.size, function.__name__, " points") as progress:
-                for k in np.ndindex(shape):
-                    point = given | {
-                        place: float(one[k])
-                        for place, one in zip(arrays, every[1:], strict=False)
-                    }
-                    here = [point.pop(i) for i in range(len(values))]
-                    try:
-                        results[k] = function(loops[every[0][k]], *here, **point)
-                    except (ValueError, CountError) as error:
-                        reasons[k] = str(error)
+            every = which, *arrays.values()
+            shape = broadcast_shape(("the list of loops", *map(str, arrays)), every)
+
+            def single(loop: int, *point: float) -> Any:
+                here = given | dict(zip(arrays, map(float, point), strict=True))
+                placed = [here.pop(i) for i in range(len(rest))]
+                try:
+                    return function(loops[loop], *placed, **here)
+                except (ValueError, CountError) as error:
+                    return error
+                finally:
                     progress.update()
-            return Many(results, reasons)
+
+            with Progress(math.prod(shape), function.__name__, " points") as progress:
+                return Many(np.frompyfunc(single, len(every), 1)(*every))
 
         return cast("_Function", call)
 
     return decorate
-
-
-def _arrays(name: str, loops: list[Any], given: dict[Any, Any]) -> dict[Any, FloatArray]:
-    """Return what is given as a list or an array, by name or place, or raise."""
-    names = System.of(loops[0], name).parameters if loops else ()
-    return {
-        place: real_array(names[place] if place in range(len(names)) else str(place), value)
-        for place, value in given.items()
-        if isinstance(value, list | tuple | np.ndarray)
-    }

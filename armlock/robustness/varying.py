@@ -1,21 +1,45 @@
-"""The radius of perturbations that vary in time, and beside it that of constant ones."""
+"""How far the factors of the arms may vary in time, and how far they may differ.
+
+D changes by - sum_k eta_k B_k exp(-s theta_k). The loop stays stable for all eta_k(t) within a
+radius if the small-gain theorem holds with constant scalings (Lemma 22). One polynomial f with
+|f|^2 >= sum |B_k|^2 on the axis, a spectral factor, reduces this to the peak gain of f / D.
+"""
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import flint
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq, fmpq_poly
 
 from armlock.affine import Affine
-from armlock.checks import real_number
-from armlock.engine.functions import common_zeros
-from armlock.engine.margins import require_stable
-from armlock.engine.varying import constant_radius_of, varying_radius_of
+from armlock.checks import FloatArray, real_number
+from armlock.engine import chain, decide
+from armlock.engine.chain import UndecidedError
+from armlock.engine.decide import Family
+from armlock.engine.functions import Function, Space, at, common_zeros, stacked
+from armlock.engine.inclusion import VERTEX
+from armlock.engine.margins import decided_ratio, first_zero, require_stable
+from armlock.engine.polynomials import Polynomial, enclosed_roots, exact, on_axis
 from armlock.loops import checked_loop
 from armlock.robustness.many import many
 from armlock.stability.counts import decided
-from armlock.tables import Table, as_html, as_text, at, number
+from armlock.tables import Table, as_html, as_text, number
+from armlock.tables import at as where
+
+# The radius is certified to this share, and the scalings are optimal to it.
+_TOLERANCE = 1e-7
+# Most scalings that are tried.
+_MOST_SCALINGS = 40
+# Larger constant perturbations are not looked at.
+_FARTHEST = 1e9
+# By how much a spectral factor is made larger, until it is one in exact arithmetic.
+_ENLARGED = (1e-13, 1e-11, 1e-9, 1e-8)
 
 
 class VaryingRadius(NamedTuple):
@@ -44,7 +68,7 @@ class VaryingRadius(NamedTuple):
     def _table(self) -> Table:
         """Show both radii, and where the first is taken."""
         rows = [
-            ("factors that vary", number(self.radius), at(self.omega)),
+            ("factors that vary", number(self.radius), where(self.omega)),
             ("constant factors", number(self.constant)),
         ]
         return Table("How far the factors of the arms may be from their values", rows)
@@ -137,3 +161,208 @@ def varying_radius(
     return VaryingRadius(
         radius, constant, omega, tuple(scaling / scalings[0] for scaling in scalings)
     )
+
+
+def _exact_polynomial(function: Function) -> fmpq_poly:
+    """Return B of a function B exp(-s theta), exactly."""
+    found = fmpq_poly()
+    for weight, p in zip(function.steady, function.space.polynomials, strict=True):
+        if weight:
+            found += weight * p.exact
+    return found
+
+
+def _fraction(value: flint.arb) -> fmpq:
+    """Return the middle of a ball, exactly."""
+    mantissa, exponent = value.mid().man_exp()
+    return mantissa * fmpq(2) ** int(exponent)
+
+
+def _is_positive(p: fmpq_poly) -> bool:
+    """Tell whether a polynomial is positive for all arguments from zero on."""
+    if p(0) <= 0 or p.leading_coefficient() < 0:
+        return False
+    # Real roots have an imaginary part of exactly zero.
+    return not any(root.imag == 0 and not root.real < 0 for root, _ in enclosed_roots(p))
+
+
+def spectral_factor(parts: Sequence[fmpq_poly], weights: Sequence[fmpq]) -> Polynomial:
+    """Return f with |f|^2 >= sum_k weights_k |B_k|^2 on the axis, and next to no more.
+
+    Parameters
+    ----------
+    parts : sequence of fmpq_poly
+        The B_k, not zero.
+    weights : sequence of fmpq
+        Positive.
+
+    Raises
+    ------
+    UndecidedError
+        If roots in double precision give none: the B_k nearly have a common zero on the axis.
+    """
+    common = parts[0]
+    for p in parts[1:]:
+        common = common.gcd(p)
+    whole = fmpq_poly()
+    for p, weight in zip(parts, weights, strict=True):
+        whole += weight * on_axis(p / common, p / common)
+    # Without a common factor the sum is positive on the whole axis.
+    roots = []
+    for x, order in enclosed_roots(whole):
+        if x.imag < 0:
+            continue
+        s = -complex((-x).sqrt())
+        roots += ([complex(s.real)] if x.imag == 0 else [s, s.conjugate()]) * order
+    lead = _fraction(flint.arb(whole.leading_coefficient()).sqrt())
+    for more in _ENLARGED:
+        f = Polynomial.of_roots(roots) * Polynomial.of([lead * (1 + exact(more))])
+        if _is_positive(on_axis(f.exact, f.exact) - whole):
+            return f * Polynomial.of(common)
+    raise UndecidedError("rounding does not decide the sum of the squares of what varies")
+
+
+def _beside(d: Function, f: Polynomial) -> tuple[Function, Function]:
+    """Return D and a polynomial as functions of one space."""
+    space = Space([*d.space.polynomials, f], d.space.lags, d.space.step)
+    none = np.zeros((1, d.delayed.shape[1]), object)
+    zero, steady = np.array([fmpq(0)], object), np.zeros(len(space.polynomials), object)
+    steady[-1] = fmpq(1)
+    delayed = np.concatenate((d.delayed, none))
+    return (
+        Function(space, np.append(d.steady, zero), delayed),
+        Function(space, steady, np.zeros_like(delayed)),
+    )
+
+
+def _best_scalings(squares: FloatArray) -> tuple[FloatArray, float]:
+    """Minimise sum d_k^2 times the largest row of sum_k squares_k / d_k^2; d and the minimum.
+
+    With x_k = log d_k^2 this is a convex problem: minimise log sum exp x_k plus the largest
+    log sum_k squares_k exp(-x_k).
+    """
+    number = squares.shape[1]
+
+    def rows(x: FloatArray) -> FloatArray:
+        found: FloatArray = np.log(squares @ np.exp(-x))
+        return found
+
+    # Importing scipy.optimize takes as long as importing this package.
+    from scipy import optimize
+
+    def whole(z: FloatArray) -> float:
+        return float(np.log(np.exp(z[:-1]).sum()) + z[-1])
+
+    start = np.append(np.zeros(number), rows(np.zeros(number)).max())
+    limits = [(0.0, 0.0), *[(-40.0, 40.0)] * (number - 1), (None, None)]
+    below = {"type": "ineq", "fun": lambda z: z[-1] - rows(z[:-1])}
+    z = optimize.minimize(
+        whole, start, bounds=limits, constraints=below, options={"ftol": 1e-15}
+    ).x
+    x = z[:-1]
+    return np.exp(0.5 * x), math.exp(np.log(np.exp(x).sum()) + rows(x).max())
+
+
+def varying_radius_of(
+    d: Function, changes: Sequence[Function]
+) -> tuple[float, float, tuple[float, ...]]:
+    """Find a radius of varying perturbations that is certified, scalings optimised (Lemma 22).
+
+    Parameters
+    ----------
+    d : Function
+        D at the constant point, whose zeros all have a negative real part, but for those at
+        s = 0 that are no roots of the loop.
+    changes : sequence of Function
+        The B_k exp(-s theta_k) by which D changes.
+
+    Raises
+    ------
+    UndecidedError
+        If double precision, or the steps allowed, do not decide it.
+    """
+    acting = [k for k, change in enumerate(changes) if not change.is_zero]
+    if not acting:
+        return math.inf, math.nan, (1.0,) * len(changes)
+    at_zero = [lead.order for k in acting if (lead := changes[k].leading())]
+    lead = d.leading()
+    if lead is None or lead.order > min(at_zero, default=0):
+        # A root at s = 0 that is hidden at the constant point moves with any perturbation.
+        return 0.0, 0.0, (1.0,) * len(changes)
+    parts = [_exact_polynomial(changes[k]) for k in acting]
+    best: tuple[float, float, tuple[float, ...]] = 0.0, math.nan, ()
+    scalings = np.ones(len(acting))
+    squares = np.zeros((0, len(acting)))
+    for _ in range(_MOST_SCALINGS):
+        sizes = [exact(size) ** 2 for size in scalings.tolist()]
+        f = spectral_factor(parts, [sum(sizes) / size for size in sizes])
+        _, radius, omega = decided_ratio(*_beside(d, f), tolerance=_TOLERANCE)
+        if radius > best[0]:
+            spread = np.ones(len(changes))
+            spread[acting] = scalings
+            best = radius, omega, tuple(spread.tolist())
+        if not 0.0 < omega < math.inf:
+            # There all magnitudes are those of leading or of highest coefficients.
+            values = _limits(d, [changes[k] for k in acting], lead.order, omega)
+        else:
+            values = np.abs(at([d, *(changes[k] for k in acting)], omega))
+        squares = np.vstack((squares, (values[1:] / values[0]) ** 2))
+        scalings, least = _best_scalings(squares)
+        # No other scalings do better at these frequencies than one over the root of this.
+        if best[0] * math.sqrt(least) >= 1.0 - 5.0 * _TOLERANCE:
+            break
+    return best
+
+
+def _limits(d: Function, changes: Sequence[Function], order: int, omega: float) -> FloatArray:
+    """Magnitudes of D, the least one, and of changes, at s = 0 or at high frequency."""
+    if omega == 0.0:
+        values = [f.series(order + 1)[order] for f in (d, *changes)]
+        return np.array([abs(float(value / values[0])) for value in values])
+    whole, turned = d.space.limits(*stacked([d, *changes]))
+    sizes: FloatArray = np.abs(whole) + np.abs(turned).sum(axis=1)
+    sizes[:1] = chain.reserve(whole[:1], turned[:1])
+    return sizes
+
+
+def constant_radius_of(d: Function, changes: Sequence[Function], below: float) -> float:
+    """Find the largest size of constant perturbations up to which no root reaches the axis.
+
+    Parameters
+    ----------
+    d, changes : Function, sequence of Function
+        As `varying_radius_of` takes them.
+    below : float
+        A size up to which no root does: a radius of varying perturbations.
+
+    Returns
+    -------
+    float
+        All |eta_k| below it, by more than a part in a million, leave the loop stable. At this
+        size one does not, or double precision does not decide it. Infinite if none up to 1e9
+        does.
+
+    Raises
+    ------
+    UndecidedError
+        If a search takes too many steps.
+    """
+    signs = list(itertools.product((1.0, -1.0), repeat=len(changes)))
+    rays = [
+        sum((f * sign for f, sign in zip(changes, way, strict=True)), d * 0) for way in signs
+    ]
+    above = min(first_zero(d, g, _FARTHEST, 0.0)[0] for g in rays)
+
+    def excludes(size: float) -> bool:
+        hull = [
+            (VERTEX, (1.0, *(sign * size for sign in way)), (0.0,) * (1 + len(changes)))
+            for way in signs
+        ]
+        return decide.excludes(Family([d, *changes], [hull]))
+
+    if below >= _FARTHEST or excludes(above * (1.0 - 1e-6)):
+        return math.inf if max(below, above) >= _FARTHEST else above
+    while above > below * (1.0 + 1e-6):
+        middle = math.sqrt(below * above)
+        below, above = (middle, above) if excludes(middle) else (below, middle)
+    return above

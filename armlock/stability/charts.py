@@ -21,7 +21,7 @@ from armlock.affine import Affine, NotAffineError
 from armlock.checks import BoolArray, FloatArray, IntArray, axis, check_memory, real_number
 from armlock.compiled import Progress
 from armlock.engine import chain
-from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
+from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import exact, rounded
@@ -87,9 +87,7 @@ class StabilityChart(Shown):
         kinds = {
             "stable": self.stable,
             "unstable": self.counts > 0,
-            "root on the axis (-1)": self.counts == BOUNDARY,
-            "chain not confined (-2)": self.counts == UNCONFINED,
-            "undecided (-3)": self.counts == UNDECIDED,
+            "-1, -2 or -3": self.counts < 0,
         }
         share = "{} points, {:.3g} %"
         for what, is_so in kinds.items():

@@ -23,7 +23,7 @@ from armlock.engine.polynomials import collected, polynomial, rounded
 from armlock.stability.counts import CountError
 from armlock.stability.crossings import crossings
 from armlock.systems import Sum, System
-from armlock.tables import Table, as_html, as_text, number, spread
+from armlock.tables import Table, as_html, as_text, spread
 
 _S = fmpq_poly([0, 1])
 #: Polynomials by the length of their delay, which may be negative.
@@ -36,13 +36,6 @@ class Line(NamedTuple):
     weight_x: float
     weight_y: float
     value: float
-
-    def _table(self) -> Table:
-        """Show the line as an equation."""
-        left = f"{number(self.weight_x)} x + {number(self.weight_y)} y"
-        return Table("Line of omega = 0", [(f"{left} = {number(self.value)}",)])
-
-    __repr__, _repr_html_ = as_text, as_html  # type: ignore[misc]
 
 
 class Branch(NamedTuple):
@@ -252,7 +245,7 @@ def d_curve_line(system: System, **numbers: float) -> Line:
     >>> from armlock import CommonArm
     >>> from armlock.stability.dcurve import d_curve_line
     >>> d_curve_line(CommonArm())
-    Line of omega = 0: 1 x + 1 y = 2
+    Line(weight_x=1.0, weight_y=1.0, value=2.0)
     """
     system, x, y = _two(system, numbers)
     # Of the roots at s = 0 that are left out the next coefficient decides.

@@ -25,7 +25,7 @@ from armlock.checks import (
     real_array,
     real_number,
 )
-from armlock.tables import Shown, Table, number, spread
+from armlock.tables import Shown, Table, spread
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -279,7 +279,7 @@ class _Rate:
         ]
 
 
-class SpectrumEstimator(Shown):
+class SpectrumEstimator:
     r"""Estimates a density from samples as they come in.
 
     Memory grows with the logarithm of the duration only, and the estimate does not depend on
@@ -321,10 +321,6 @@ class SpectrumEstimator(Shown):
     def __init__(self, sample_rate: float) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self._rates = [_Rate(self.sample_rate, 0)]
-
-    def _table(self) -> Table:
-        """Show the rate."""
-        return Table("Spectrum estimator", [(number(self.sample_rate, "Hz"),)])
 
     def add(self, series: npt.ArrayLike) -> None:
         """Take in the next samples.
