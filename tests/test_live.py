@@ -1160,7 +1160,7 @@ def test_files_and_prints_show_all_pictures_with_their_legend(opened, tmp_path):
     assert picture.shape[1] == 1600
     assert picture.shape[2] == 3 or (picture[..., 3] == 1.0).all()
     # From the chart, the s-plane, the Nyquist and the Bode plot, and a caption.
-    shown = {"stable", "undecided", "in Hz", "10²", "phase in °", "frequency in Hz"}
+    shown = {"stable", "undecided", "in Hz", "10¹", "phase in °", "frequency in Hz"}
     written = page.evaluate("drawn")
     assert {*shown, "Nyquist curve of L, compressed beyond 1"} <= set(written)
     # What they are of.
