@@ -744,12 +744,15 @@ def test_numbers_are_those_of_the_text_in_its_field(opened):
         field.press_sequentially(key)
         # What stands below is of another loop, and grey, and an unfinished text is not wrong.
         assert page.evaluate(BUSY)
-        if key in "/+":
+        # One that is whole is taken, as the same step of the history.
+        if field.input_value() in ("5", "5/(s+1)"):
+            page.wait_for_function(f"() => !({BUSY})()")
+        elif key in "/+":
             page.wait_for_timeout(700)
             assert page.evaluate(BUSY)
             shown = page.locator(".live-main").evaluate("e => getComputedStyle(e).opacity")
             assert float(shown) < 0.5
-            assert "not closed" in alert.inner_text()
+            assert "not understood" not in alert.inner_text()
     page.wait_for_function(f"() => !({BUSY})()")
     assert formula.inner_text() == "K(s) = 5 (s + 2) / (s + 1)"
     assert alert.inner_text() == ""
@@ -763,21 +766,27 @@ def test_numbers_are_those_of_the_text_in_its_field(opened):
     assert formula.inner_text() == "K(s) = 5 (s + 2) / (s + 1)"
 
 
+#: The chart of a loop is there, if not yet as fine as it will be.
+CHARTED = "() => /Refining|certain/.test(document.querySelector('.live-main').textContent)"
+
+
 def test_a_loop_that_is_left_keeps_no_other_waiting(opened):
     page = opened()
+
+    def charted():
+        begun = page.evaluate("performance.now()")
+        start(page, "The robust loop")
+        page.wait_for_function(CHARTED)
+        return page.evaluate("performance.now()") - begun
+
+    start(page, "Single arm")
+    page.wait_for_function(CHARTED)
+    alone = charted()
     start(page, WHITE_PAPER)
-    # Some 130 000 unstable roots: each count takes a second or more.
+    # Some 130 000 unstable roots: its chart takes several seconds.
     type_in(page, "Dead time in s", "0.035")
-    page.wait_for_timeout(800)
-    start(page, "The robust loop")
-    begun = page.evaluate("performance.now()")
-    table(page)
-    later = page.evaluate("performance.now()") - begun
-    alone = opened()
-    start(alone, "The robust loop")
-    begun = alone.evaluate("performance.now()")
-    table(alone)
-    assert later < 3 * (alone.evaluate("performance.now()") - begun) + 1500
+    page.wait_for_timeout(1500)
+    assert charted() < 2 * alone + 1000
 
 
 def test_what_takes_too_many_steps_is_refused_at_once(opened):
