@@ -518,7 +518,7 @@ function armlockPages() {
       orbit.href = `in_orbit.html${hash}`;
       if (quiet) return;
       // A point that goes on moving is one step, and so is a text that is being typed; another view is none.
-      const further = step && hash !== location.hash && !(step === before && step !== "loop");
+      const further = step && hash !== location.hash && !(step === before && /^(point|typed)/.test(step));
       before = step || before;
       const write = () => {
         history[further ? "pushState" : "replaceState"]({ depth }, "", hash);
