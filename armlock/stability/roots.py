@@ -730,6 +730,8 @@ def _all_right_of(n: Function, m: Function, sigma: float, point: FloatArray) -> 
             "than rounding can tell",
             point[None],
         )
+    if discs is None and function.space.step:
+        raise ValueError(f"system must have at most {_LARGEST_MAP} steps in its longest delay")
     if number > _MOST_ROOTS:
         raise ValueError(
             f"right_of must leave at most {_MOST_ROOTS} roots, got {sigma:g} with {number}"

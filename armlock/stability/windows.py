@@ -12,12 +12,13 @@ from math import factorial
 from typing import NamedTuple
 
 import flint
+import numpy as np
 from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_mpoly_ctx, fmpq_poly
 
 from armlock.checks import positive_number
 from armlock.engine.chain import Delay, Lag
 from armlock.engine.polynomials import collected, enclosed_roots, exact
-from armlock.stability.counts import UNCONFINED, unstable_roots
+from armlock.stability.counts import UNCONFINED, CountError, unstable_roots
 from armlock.systems import Sum, System, delay_object, exact_number
 
 # Bits of frequencies, to which share exp(-s theta) is known, and most windows.
@@ -64,7 +65,7 @@ def stable_delays(
         windows. With several delays, count at lengths
         of your choice: ``[unstable_roots(loop(theta)) for theta in lengths]``.
     CountError
-        If the count in a window takes too many steps.
+        If the count in a window takes too many steps, or two crossings of one factor coincide.
 
     Notes
     -----
@@ -198,7 +199,13 @@ def _edges(
 def _lengths(powers: Sequence[fmpq_poly], omega: arb, longest: arb) -> list[arb]:
     """Return the lengths at which j omega is a root."""
     found, s = [], acb(0, omega)
-    for z in acb_poly([acb_poly(p)(s) for p in powers]).roots(tol=_TOLERANCE):
+    try:
+        turns = acb_poly([acb_poly(p)(s) for p in powers]).roots(tol=_TOLERANCE)
+    except ValueError:
+        raise CountError(
+            f"no windows: at {float(omega):.6g} rad/s two crossings coincide", np.empty((1, 0))
+        ) from None
+    for z in turns:
         if not abs(z).overlaps(arb(1)):
             continue
         # Next to the negative real axis the angle jumps.
