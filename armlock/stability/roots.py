@@ -774,7 +774,8 @@ def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayL
 
     Notes
     -----
-    Certified means that no root is counted right of Re s + m. Here m is 1e-11 of |s| or of one
+    Certified means that a small disc around s holds a root (Lemma 25), and that no root is
+    counted right of Re s + m. Here m is 1e-11 of |s| or of one
     over the longest delay, whichever is larger. Where so fine a count is not decided, m is 1e-6
     of |Re s| or of one over the longest delay. Roots whose real parts differ by less than the
     first m count as equal, and the one of lowest frequency that was found is returned.
