@@ -43,7 +43,6 @@ from typing import Any
 from armlock import controllers as controllers
 from armlock import paper as paper
 from armlock import sensors as sensors
-from armlock.controllers import Controller
 from armlock.loops import (
     CommonArm,
     DualArm,
@@ -93,7 +92,7 @@ from armlock.stability.semidiscretization import (
     transition_matrix,
 )
 from armlock.stability.windows import stable_delays
-from armlock.systems import System, delay, equation, parameter, s
+from armlock.systems import Controller, System, delay, equation, parameter, s
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
 from armlock.timedomain.responses import impulse_response, step_info, step_response
 from armlock.timedomain.simulation import (

@@ -12,33 +12,24 @@ any other `armlock.systems.System`. The Hayes equation has no sensor: it is an e
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from numbers import Real
 from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
-from flint import fmpq_poly
 
 from armlock import paper, sensors
-from armlock.affine import quotient_at
 from armlock.checks import (
     ComplexArray,
-    broadcast_shape,
-    complex_array,
     not_negative,
     one_of,
     positive_number,
-    real_array,
     true_or_false,
 )
-from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
-from armlock.engine.chain import Lag
-from armlock.engine.functions import limit_at_zero
-from armlock.engine.polynomials import Polynomial, exact, order, polynomial
+from armlock.controllers import integrating_actuator, table_two, white_paper
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
-from armlock.systems import Sum, System, equation, parameter
+from armlock.systems import NOW, Controller, Sum, System, equation, lag_of, parameter
 from armlock.systems import delay as pure_delay
 from armlock.systems import s as laplace
 from armlock.tables import Table, as_html, number
@@ -78,7 +69,6 @@ def HayesEquation(tau: float = 1.0) -> System:
     return equation(laplace - parameter("a") - parameter("b") * late)
 
 
-@dataclass(frozen=True)
 class Loop(System):
     r"""An arm-locking loop, with free parameters (c1, c2).
 
@@ -94,8 +84,8 @@ class Loop(System):
 
     Parameters
     ----------
-    controller : Controller, python-control system, or (zeros, poles, gain)
-        Controller times actuator, K(s), see `armlock.Controller.of`.
+    controller : System, python-control system, or (zeros, poles, gain)
+        Controller times actuator, K(s), see `armlock.System.of`.
     mapping : SignalMapping or str
         The sensor: an object, for instance `armlock.sensors.COMMON`, or a name ("single",
         "common", "difference", "dual", "modified dual"), see `armlock.sensors.named`.
@@ -114,7 +104,7 @@ class Loop(System):
 
     Attributes
     ----------
-    controller : Controller
+    controller : System
         K(s).
     mapping : SignalMapping
         The weights m1 and m2.
@@ -149,103 +139,79 @@ class Loop(System):
     array([0, 1])
     """
 
-    # Anything that `Controller.of` takes, and a name, until they are checked.
-    controller: Any
-    mapping: Any
+    controller: System
+    mapping: SignalMapping
     tau1: float
-    tau2: float = None  # type: ignore[assignment]
-    delay: float = 0.0
-    #: The round trips as delays, for `armlock.margins` and others that ask for delay objects.
-    arms: tuple[System, System] = field(init=False, repr=False, compare=False)
+    tau2: float
+    delay: float
+    arms: tuple[System, System]
 
-    def __post_init__(self) -> None:
-        """Check the arguments, and keep them in one form."""
-        k = Controller.of(self.controller)
-        m, tau1, tau2 = _mapping_and_delays(self.mapping, self.tau1, self.tau2)
-        kept = {
-            "controller": k, "mapping": m, "tau1": tau1, "tau2": tau2,
-            "delay": not_negative("delay", self.delay),
-            "arms": (pure_delay(tau1), pure_delay(tau2)),
-            "nominal": {"c1": 1.0, "c2": 1.0}, "step": 0.0, "at_zero": None,
-        }  # fmt: skip
-        for name, value in kept.items():
-            object.__setattr__(self, name, value)
-        rest, *arms = self._cleared
-        for name, b in zip(("m1", "m2"), arms, strict=True):
-            if b.degree() > rest.degree():
+    def __init__(
+        self,
+        controller: Any,
+        mapping: SignalMapping | str,
+        tau1: float,
+        tau2: float | None = None,
+        delay: float = 0.0,
+    ) -> None:
+        k = System.of(controller, "controller")
+        sensor, tau1, tau2 = _mapping_and_delays(mapping, tau1, tau2)
+        delay, arms = not_negative("delay", delay), (pure_delay(tau1), pure_delay(tau2))
+        vars(self).update(
+            controller=k, mapping=sensor, tau1=tau1, tau2=tau2, delay=delay, arms=arms
+        )
+        if not k.numerator:
+            raise ValueError("controller must not be zero: there would be no loop")
+        zeros, poles = k.rational("controller")
+        m1, m2, below = sensor.polynomials
+        first, second, rest = zeros * m1, zeros * m2, poles * below
+        for name, weighed in (("m1", first), ("m2", second)):
+            if weighed.degree() > rest.degree():
                 raise ValueError(
                     f"controller times signal mapping {name} must be proper, got "
-                    f"{b.degree()} zeros and {rest.degree()} poles"
+                    f"{weighed.degree()} zeros and {rest.degree()} poles"
                 )
-        # The highest power of 1 + L.
-        highest = 1 + float(sum(b[rest.degree()] for b in arms) / rest.leading_coefficient())
-        if not self.delay and abs(highest) <= 1e-12:
+        highest = 1.0 + float((first + second)[rest.degree()] / rest.leading_coefficient())
+        if not delay and abs(highest) <= 1e-12:
             raise ValueError(
                 f"the loop is not well posed: 1 + K (m1 + m2) must not vanish at high "
                 f"frequency, got {highest}"
             )
+        now = lag_of(pure_delay(delay)) if delay else NOW
+        one, other = [now.times(lag_of(arm)) for arm in arms]
+        terms = {(now, ()): first + second, (one, ("c1",)): -first, (other, ("c2",)): -second}
+        super().__init__(Sum(terms), Sum.of(rest), {"c1": 1.0, "c2": 1.0})
 
     def _table(self) -> Table:
         """Show the arguments, and no coefficients."""
         k = self.controller
-        factors = f"{len(k.zeros)} zeros and {len(k.poles)} poles, gain {number(k.gain)}"
+        factors = f"{k.zeros().size} zeros and {k.poles().size} poles, gain {number(k.gain)}"
         rows = [("controller", factors), ("sensor", self.mapping.name)]
         rows += [(name, number(getattr(self, name), "s")) for name in ("tau1", "tau2", "delay")]
         return Table("Arm-locking loop with parameters c1 and c2", rows)
 
     _repr_html_ = as_html
 
-    # Multiplied out, a loop is no text that one reads.
-    _repr_latex_ = None  # type: ignore[assignment]
+    def _repr_latex_(self) -> None:
+        """Show no text: multiplied out, a loop is none that one reads."""
 
-    def __getstate__(self) -> dict[str, Any]:  # type: ignore[override]
-        """Return the arguments and the delay objects."""
-        names = [one.name for one in fields(self)]
-        return {name: getattr(self, name) for name in (*names, "nominal", "step", "at_zero")}
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Raise where an argument would change without the loop."""
+        if name in vars(self):
+            raise AttributeError(
+                f"{name} of a loop cannot be set: write loop.replace({name}=...)"
+            )
+        super().__setattr__(name, value)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:  # type: ignore[override]
-        """Take them back."""
-        self.__dict__.update(state)
+    def __repr__(self) -> str:
+        """List the arguments."""
+        return f"Loop({', '.join(f'{k}={v!r}' for k, v in self.arguments.items())})"
 
-    @cached_property
-    def _cleared(self) -> tuple[fmpq_poly, fmpq_poly, fmpq_poly]:
-        """R, B1 and B2, exactly, without a common power of s."""
-        k, m = self.controller, self.mapping
-        zeros, poles = k.numerator.exact, k.denominator.exact
-        rest = poles * polynomial(m.denominator)
-        arms = [zeros * polynomial(p) for p in (m.numerator1, m.numerator2)]
-        # As many poles at s = 0 as all three have zeros there.
-        power = fmpq_poly([0, 1]) ** min(order(p.coeffs()) for p in (rest, *arms) if p)
-        return rest // power, arms[0] // power, arms[1] // power
-
-    @cached_property
-    def numerator(self) -> Sum:  # type: ignore[override]
-        """N = exp(-s delay) [B1 (1 - c1 exp(-s tau1)) + B2 (1 - c2 exp(-s tau2))]."""
-        _, *arms = self._cleared
-        dead = self._dead
-        found = Sum({(dead, ()): arms[0] + arms[1]})
-        for name, b, arm in zip(self.nominal, arms, self.arms, strict=True):
-            ((lag, _),) = arm.numerator.terms
-            found = found + Sum.of(-b, lag.times(dead), name)
-        return found
-
-    @cached_property
-    def denominator(self) -> Sum:  # type: ignore[override]
-        """M = R."""
-        return Sum.of(self._cleared[0])
-
-    @cached_property
-    def _dead(self) -> Lag:
-        """The dead time, one delay object with the mark of the first arm."""
-        ((((arm, _),), _),) = self.arms[0].numerator.terms
-        return Lag.after(exact(self.delay), f"dead {arm.mark}")
-
-    @cached_property
-    def _polynomials(self) -> tuple[Polynomial, ...]:
-        """R, B1, B2, half of B1 + B2 and of B1 - B2, of which no term is left that cancels."""
-        rest, b1, b2 = self._cleared
-        parts = rest, b1, b2, (b1 + b2) / 2, (b1 - b2) / 2
-        return tuple(Polynomial.of(p) for p in parts)
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The arguments that make the loop, by name."""
+        names = "controller", "mapping", "tau1", "tau2", "delay"
+        return {name: getattr(self, name) for name in names}
 
     def replace(self, **changes: Any) -> Self:
         """Return another one, made with other values of some arguments.
@@ -271,86 +237,38 @@ class Loop(System):
         >>> CommonArm().replace(delay=20e-6).delay
         2e-05
         """
-        return replace(self, **changes)
+        return type(self)(**{**self.arguments, **changes})
 
-    @np.errstate(under="ignore")
+    @cached_property
+    def paths(self) -> dict[str, System]:
+        """From what adds to the signal of an arm, of both or of their difference, to K.
+
+        K m1 exp(-s delay) and K m2 exp(-s delay), and half of their sum and difference.
+        """
+        first, second = self.mapping.systems
+        weights = first, second, (first + second) / 2, (first - second) / 2
+        late = self.controller * pure_delay(self.delay)
+        names = "arm 1", "arm 2", "common", "differential"
+        return {name: late * weight for name, weight in zip(names, weights, strict=True)}
+
+    def response(self, source: str) -> System:
+        """Return the closed loop from an input to the locked laser, see `armlock.transfer`.
+
+        Parameters
+        ----------
+        source : {"laser", "arm 1", "arm 2", "common", "differential"}
+            The input.
+        """
+        return self._closed[one_of("source", source, tuple(self._closed))]
+
+    @cached_property
+    def _closed(self) -> dict[str, System]:
+        closed = {source: -path / (1 + self) for source, path in self.paths.items()}
+        return {"laser": 1 / (1 + self), **closed}
+
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.
-
-        Parameters
-        ----------
-        s : array_like of complex
-            Laplace variable in rad/s, any shape.
-
-        Returns
-        -------
-        tuple of two complex arrays, shaped like `s`
-
-        Raises
-        ------
-        TypeError, ValueError
-            If s does not hold finite numbers, or holds a pole of K, m1 or m2.
-        """
-        s, (rest, b1, b2, _, _) = complex_array("s", s), self._polynomials
-        for pole in set(rest.roots):
-            if (s == pole).any():
-                raise ValueError(
-                    f"s must not be a pole of the open loop, got {pole}: a limit there is not "
-                    f"computed"
-                )
-        dead = np.exp(-s * self.delay)
-        return b1.over(rest, s) * dead, b2.over(rest, s) * dead
-
-    @np.errstate(under="ignore")
-    def half_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """Evaluate half the sum and half the difference of `arm_responses`; nothing cancels."""
-        s, (rest, _, _, plus, minus) = complex_array("s", s), self._polynomials
-        dead = np.exp(-s * self.delay)
-        return plus.over(rest, s) * dead, minus.over(rest, s) * dead
-
-    @np.errstate(under="ignore")
-    def __call__(  # type: ignore[override]
-        self,
-        s: npt.ArrayLike,
-        c1: npt.ArrayLike = 1.0,
-        c2: npt.ArrayLike = 1.0,
-        squeeze: Any = None,
-    ) -> ComplexArray:
-        """Evaluate the open loop L(s; c1, c2), as python-control does.
-
-        Parameters
-        ----------
-        s : array_like of complex
-            Laplace variable in rad/s.
-        c1, c2 : array_like of float, optional
-            Multiplicative perturbations, 1 where there are none. All three broadcast.
-
-        Returns
-        -------
-        complex array, of the broadcast shape
-
-        Raises
-        ------
-        TypeError, ValueError
-            If s does not hold finite numbers, or holds a pole of K, m1 or m2, c1 or c2 is not
-            finite and real, or the three do not broadcast. At s = 0 it is a pole of L that is
-            refused; where one of K cancels, the limit is returned.
-        """
-        s, c1, c2 = complex_array("s", s), real_array("c1", c1), real_array("c2", c2)
-        broadcast_shape(("s", "c1", "c2"), (s, c1, c2))
-        at_zero = (s == 0.0) & (self._polynomials[0].order > 0)
-        if at_zero.any():
-            every = np.broadcast_arrays(s, c1, c2, at_zero)
-            found = np.array([
-                limit_at_zero(*quotient_at(self, (x, y))) if zero else self(z, x, y)
-                for z, x, y, zero in zip(*(a.ravel().tolist() for a in every), strict=True)
-            ])  # fmt: skip
-            if np.isinf(found).any():
-                raise ValueError("s must not be a pole of the open loop, got 0")
-            return found.reshape(every[0].shape).astype(np.complex128)
-        first, second = self.arm_responses(s)
-        result: ComplexArray = first * ((1.0 - c1) - c1 * np.expm1(-s * self.tau1))
-        return result + second * ((1.0 - c2) - c2 * np.expm1(-s * self.tau2))
+        """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay) at s in rad/s, any shape."""
+        return self.paths["arm 1"](s), self.paths["arm 2"](s)
 
 
 def _mapping_and_delays(
@@ -593,7 +511,7 @@ def paper_loop(
     >>> unstable_roots(paper_loop(), 1.0, [1.0, 1.0 - 1e-6])
     array([0, 0])
     """
-    chosen = table_two() if controller is None else Controller.of(controller)
+    chosen = table_two() if controller is None else System.of(controller, "controller")
     if true_or_false("actuator", actuator):
         chosen = chosen * integrating_actuator()
     mapping = sensors.dual(corner, tau1 - tau2 if difference is None else difference)

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from armlock.checks import FloatArray, real_array, whole_number
-from armlock.controllers import check_continuous
 from armlock.engine.polynomials import exact, order, polynomial
 from armlock.engine.statespace import bordered, settled
 from armlock.systems import (
     Sum,
     System,
+    check_continuous,
     delay,
     delay_object,
     equation_of,

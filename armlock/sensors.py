@@ -14,17 +14,19 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq_poly
 from numpy.polynomial import polynomial as poly
 
 from armlock import paper
 from armlock.checks import (
     ComplexArray,
     axis,
-    complex_array,
     one_of,
     positive_number,
     real_number,
 )
+from armlock.engine.polynomials import polynomial
+from armlock.systems import Sum, System
 
 
 @dataclass(frozen=True)
@@ -75,14 +77,22 @@ class SignalMapping:
         if not any(self.denominator):
             raise ValueError(f"denominator must not be zero, got {self.denominator}")
 
+    @property
+    def polynomials(self) -> tuple[fmpq_poly, fmpq_poly, fmpq_poly]:
+        """Both numerators and the denominator, exactly."""
+        first, second = polynomial(self.numerator1), polynomial(self.numerator2)
+        return first, second, polynomial(self.denominator)
+
+    @property
+    def systems(self) -> tuple[System, System]:
+        """The weights m1 and m2 as systems."""
+        first, second, below = map(Sum.of, self.polynomials)
+        return System(first, below), System(second, below)
+
     def weights(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate (m1, m2) at complex s, in rad/s; both are shaped like `s`."""
-        s = complex_array("s", s)
-        below: ComplexArray = poly.polyval(s, np.asarray(self.denominator, dtype=float))
-        return (
-            poly.polyval(s, np.asarray(self.numerator1, dtype=float)) / below,
-            poly.polyval(s, np.asarray(self.numerator2, dtype=float)) / below,
-        )
+        first, second = self.systems
+        return first(s), second(s)
 
 
 #: One arm alone.

@@ -10,22 +10,20 @@ makes D = 0 instead.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping
-from decimal import Decimal
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
+from functools import cached_property
 from itertools import chain
 from math import factorial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+from uuid import uuid4
+from weakref import WeakValueDictionary
 
-import flint
 import numpy as np
 import numpy.typing as npt
-from flint import acb, acb_poly, arb, fmpq, fmpq_poly
-from numpy.polynomial import polynomial as poly
+from flint import fmpq, fmpq_poly
 
 from armlock.checks import (
-    BoolArray,
     ComplexArray,
     FloatArray,
     broadcast_shape,
@@ -36,21 +34,24 @@ from armlock.checks import (
     whole_number,
     whole_steps,
 )
-from armlock.controllers import Controller, check_system, rational
-from armlock.engine.chain import NOW, Delay, Lag
-from armlock.engine.polynomials import Polynomial, collected, exact, order, polynomial, rounded
+from armlock.engine import statespace
+from armlock.engine.affine import Affine, NotAffineError, present
+from armlock.engine.functions import Function
+from armlock.engine.polynomials import (
+    Polynomial,
+    collected,
+    exact,
+    of_roots,
+    order,
+    polynomial,
+)
 from armlock.engine.statespace import ROUNDED, Lowest, settled
+from armlock.typeset import number, written
 
 if TYPE_CHECKING:
     import control
 
-#: A product of delays, and the names of the parameters that are multiplied.
-Key = tuple[Lag, tuple[str, ...]]
-#: Sizes of coefficients, by the parameters that are multiplied.
-Sizes = dict[tuple[str, ...], fmpq_poly]
-
 _ONE, _S = fmpq_poly([1]), fmpq_poly([0, 1])
-_UNIT = fmpq(1)
 # Arguments of the functions that take parameters by name.
 _TAKEN = frozenset(
     [
@@ -80,20 +81,93 @@ _TAKEN = frozenset(
 )
 # Coefficients at s = 0 that are looked at for a limit there.
 _TERMS = 16
-# Where the terms of a sum are larger than the sum by this factor, it is computed with balls: of
-# so many bits at first, and at most, until so many of them are known.
-_MAY_LOSE, _FEWEST_BITS, _MOST_BITS, _ENOUGH_BITS = 2.0**11, 128, 1 << 14, 60
-# Rounding errors of a sum in double precision, over the size of its terms.
-_ROUNDING = 2.0**-51
 # What to write where python-control, or its user, asks a system for something.
 _INSTEAD = {
     "plot_phase": "control.bode_plot(L.frequency_response(omega))",
+    "dt": "armlock.nyquist(L, omega_max=...).plot()",
     "response": "armlock.nyquist(L, omega_max=...).plot()",
     "dcgain": "L(0)",
 }
 # Largest power of a system, and longest text of one.
 _LARGEST_POWER = 10**6
 _LONGEST_TEXT = 400
+# A longer text of a system without delays and parameters is that of its factors.
+_LONGEST_RATIONAL = 60
+
+
+class Delay:
+    """A delay object: theta in s, and the mark by which it differs from all others.
+
+    Two objects are two delays even if they are equally long: a small change of one of them
+    alone is a small change of the loop. The mark is the same in other processes, and there is
+    one object of each in a process: it is compared by identity, which is fast.
+    """
+
+    __slots__ = "__weakref__", "mark", "theta"
+    _known: ClassVar[WeakValueDictionary[tuple[str, str], Delay]] = WeakValueDictionary()
+
+    theta: fmpq
+    mark: str
+
+    def __new__(cls, theta: fmpq, mark: str) -> Delay:
+        """Return the object of this length and mark."""
+        found = cls._known.get((str(theta), mark))
+        if found is None:
+            found = cls._known[str(theta), mark] = super().__new__(cls)
+            found.theta, found.mark = theta, mark
+        return found
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle length and mark."""
+        return Delay, (self.theta, self.mark)
+
+    @classmethod
+    def new(cls, theta: fmpq) -> Delay:
+        """Return an object that is none other."""
+        return cls(theta, uuid4().hex)
+
+
+class Lag(tuple[tuple[Delay, int], ...]):
+    """A product of delay objects: pairs of an object and its power, sorted."""
+
+    @classmethod
+    def of(cls, powers: Mapping[Delay, int]) -> Self:
+        """Return the product of objects to these powers."""
+        pairs = [(delay, n) for delay, n in powers.items() if n]
+        if len(pairs) > 1:
+            pairs.sort(key=lambda pair: (pair[0].theta, pair[0].mark))
+        return cls(pairs)
+
+    @classmethod
+    def after(cls, theta: fmpq, mark: str = "") -> Self:
+        """Return one object of a length, by default the one that all of this length share."""
+        return cls([(Delay(theta, mark), 1)] if theta else [])
+
+    def times(self, other: Lag) -> Lag:
+        """Return the product of two."""
+        if not (self and other):
+            return self or other
+        return Lag.of(collected((*self, *other)))
+
+    @cached_property
+    def time(self) -> fmpq:
+        """The delay of the product, in s."""
+        return sum((delay.theta * n for delay, n in self), fmpq(0))
+
+    @property
+    def merged(self) -> Self:
+        """The one object that all products of this length share."""
+        return self.after(self.time)
+
+
+#: The product of no delays.
+NOW = Lag()
+
+
+#: A product of delays, and the names of the parameters that are multiplied.
+Key = tuple[Lag, tuple[str, ...]]
+#: Sizes of coefficients, by the parameters that are multiplied.
+Sizes = dict[tuple[str, ...], fmpq_poly]
 
 
 class Sum:
@@ -163,6 +237,8 @@ class Sum:
 
     def put(self, values: Mapping[str, Sum]) -> Sum:
         """Put sums in place of parameters."""
+        if not values:
+            return self
         found = Sum({})
         for (lag, names), p in self.terms.items():
             term = Sum.of(p, lag, *(a for a in names if a not in values))
@@ -254,121 +330,12 @@ class Sum:
         found = collected((lag.time, p) for lag, p in self.before(*names).items())
         return {time: p for time, p in sorted(found.items()) if p}
 
-    @np.errstate(under="ignore")
-    def at(
-        self,
-        s: ComplexArray,
-        values: Mapping[str, FloatArray],
-        unit: fmpq = _UNIT,
-        size: fmpq = _UNIT,
-    ) -> tuple[ComplexArray, FloatArray]:
-        """Evaluate at s and at values of the parameters, all of one shape, over a size.
-
-        By coefficients of powers of s / unit. Where terms cancel, the sum is computed again
-        with more bits. The second result bounds rounding errors, apart from those of s theta.
-        """
-        delayed = [float(lag.time) for lag in self.lags if lag]
-        # Far on the right exponentials vanish beside one. Elsewhere the sum is that of all
-        # polynomials, and of terms of exp(..) - 1, in which large terms cancel exactly.
-        far = s.real * min(delayed, default=0.0) > 1.0
-        at, near = s / float(unit), ~far
-        found, terms = np.zeros_like(s), np.zeros(s.shape)
-
-        def add(p: fmpq_poly, here: BoolArray, factor: Any = 1.0) -> None:
-            scaled = np.array(
-                [float(c * unit**k / size) for k, c in enumerate(p.coeffs())] or [0.0]
-            )
-            found[here] += poly.polyval(at[here], scaled) * factor
-            terms[here] += poly.polyval(np.abs(at[here]), np.abs(scaled)) * np.abs(factor)
-
-        if not values:
-            add(self.whole(), near)
-        for (lag, names), p in self.terms.items():
-            gain = np.prod([values[name] for name in names], axis=0) + np.zeros(s.shape)
-            turn = -s * float(lag.time)
-            if values:
-                add(p, near, gain[near])
-            if lag.time:
-                add(p, near, gain[near] * np.expm1(turn[near]))
-            add(p, far, gain[far] * np.exp(turn[far]))
-        cancelled = terms > _MAY_LOSE * np.abs(found)
-        for k in map(tuple, np.argwhere(cancelled)):
-            found[k] = self._in_balls(s[k], {name: v[k] for name, v in values.items()}, size)
-        terms[cancelled] = np.abs(found[cancelled])
-        return found, _ROUNDING * terms
-
-    def _in_balls(self, s: complex, values: Mapping[str, float], size: fmpq) -> complex:
-        """Evaluate at one point, with as many bits as the terms cancel."""
-        # Delays of one length are one here: no sum that is left is zero but at s = 0 and at
-        # zeros of its polynomials, which are exact in balls.
-        terms = collected(((lag.time, names), p) for (lag, names), p in self.terms.items())
-        at, bits = acb(s.real, s.imag), _FEWEST_BITS
-        while True:
-            with flint.ctx.workprec(bits):
-                total = acb(0)
-                for (theta, names), p in terms.items():
-                    if p:
-                        term = acb_poly(p)(at) * (-at * arb(theta)).exp()
-                        total += math.prod((acb(values[name]) for name in names), start=term)
-                total /= arb(size)
-            if total.rel_accuracy_bits() > _ENOUGH_BITS or total == 0 or bits > _MOST_BITS:
-                return complex(total)
-            bits *= 2
-
-    def text(self, latex: bool = False) -> str:
-        """Return the sum as one writes it."""
-        shown = []
-        for (lag, names), p in sorted(
-            self.terms.items(), key=lambda term: (term[0][0].time, term[0][1])
-        ):
-            factors = [*names]
-            if lag:
-                factors.append(_exponential(lag, latex))
-            power = _powers(p, latex)
-            several = sum(map(bool, p.coeffs())) > 1 and (factors or len(self.terms) > 1)
-            if factors and power in ("1", "-1"):
-                shown.append(power[:-1] + " ".join(factors))
-            else:
-                shown.append(" ".join([f"({power})" if several else power, *factors]))
-        return " + ".join(shown).replace("+ -", "- ") or "0"
-
 
 def _times(a: Sizes, b: Sizes) -> Sizes:
     """Multiply sizes."""
     if len(a) == len(b) == 1 and () in a and () in b:
         return {(): a[()] * b[()]}
     return collected((tuple(sorted(m + n)), p * q) for m, p in a.items() for n, q in b.items())
-
-
-def _number(value: fmpq) -> str:
-    """Return a fraction, which may be no float, with six digits."""
-    try:
-        if value == 0 or abs(float(value)) > 1e-300:
-            return f"{float(value):.6g}"
-    except OverflowError:
-        pass
-    return f"{Decimal(int(value.p)) / int(value.q):.5e}"
-
-
-def _exponential(lag: Lag, latex: bool) -> str:
-    """Return exp(-s theta) as text."""
-    exponent = f"-{_number(lag.time)} s"
-    return f"e^{{{exponent}}}" if latex else f"exp({exponent})"
-
-
-def _powers(p: fmpq_poly, latex: bool) -> str:
-    """Return a polynomial as text, in descending powers."""
-    shown = []
-    for k, c in reversed(list(enumerate(p.coeffs()))):
-        if c:
-            number, power = _number(c), ("", "s", f"s^{{{k}}}" if latex else f"s^{k}")
-            symbol = power[min(k, 2)]
-            if symbol and number in ("1", "-1"):
-                number = number[:-1]
-            if latex and "e" in number:
-                number = number.replace("e", r" \cdot 10^{") + "}"
-            shown.append(f"{number} {symbol}".strip() if number != "-" else f"-{symbol}")
-    return " + ".join(shown).replace("+ -", "- ")
 
 
 _UNITY = Sum.of(_ONE)
@@ -430,6 +397,8 @@ class System:
     nominal: dict[str, float | None]
     step: float
     at_zero: int | None
+    #: What stands for the system as text, if it was made of factors.
+    shown = ""
 
     def __init__(
         self,
@@ -445,31 +414,76 @@ class System:
         self.nominal, self.step, self.at_zero = dict(nominal or {}), step, at_zero
 
     @classmethod
-    def of(cls, system: Any, name: str = "system") -> System:
-        """Return a system given as one, a number, a controller, or by python-control.
+    def of(
+        cls,
+        system: Any,
+        name: str = "system",
+        *,
+        integrators: int | None = None,
+        zeros: int | None = None,
+    ) -> System:
+        """Return a system given as one, by its factors, by python-control, or as a number.
 
         Parameters
         ----------
-        system : System, real number, Controller, or python-control system
+        system : System, python-control system, (zeros, poles, gain), or real number
             A transfer function or state space must be continuous in time, with one input and
-            one output. Use a `Controller` for many or repeated factors: python-control
-            multiplies them out.
+            one output.
         name : str, optional
             What an error calls it.
+        integrators : int, optional
+            How many poles of a python-control system are zero: 0, 1 or 2. It is needed where
+            rounding may have moved such poles.
+        zeros : int, optional
+            The same for its zeros, for instance 1 for a high-pass filter, or for an integrator
+            that the input does not reach.
 
         Raises
         ------
         TypeError, ValueError
-            If it is none of these, or not finite.
+            If it is none of these, is not finite, is in discrete time, has several inputs or
+            outputs, if rounding hides whether a pole or zero is at s = 0, or if the
+            coefficients contradict `integrators` or `zeros` by more than rounding.
+
+        Notes
+        -----
+        Coefficients and matrices are taken as the binary numbers that they are, exactly.
+
+        Rounding leaves some 1e-17 in place of a coefficient that is meant to be zero, for
+        instance of a state space in other coordinates, or of polynomials that were multiplied
+        out. A system whose lowest coefficient is as small is refused until `integrators` and
+        `zeros` say what is meant. What is stated is set to zero: a true pole at 1e-9 rad/s is
+        then lost. The next coefficient is asked in the same way. With ``integrators=0`` the
+        coefficients are taken as they are.
+
+        python-control multiplies all factors out, those of `control.zpk` too. It turns
+        ``control.zpk([], [-1e-3] * 5, 1)`` into five complex poles around -1e-3. Write
+        ``Controller([], [-1e-3] * 5, 1)`` instead.
+
+        Examples
+        --------
+        >>> import control
+        >>> from armlock import System
+        >>> System.of(control.tf([2.0, 1.0], [1.0, 0.5, 0.0])).poles()
+        array([-0.5+0.j,  0. +0.j])
         """
+        is_number = isinstance(system, fmpq | Fraction | float | int | np.number | np.ndarray)
+        is_triple = isinstance(system, tuple) and len(system) == 3
+        if isinstance(system, System) or is_number or is_triple:
+            for stated, given in (("integrators", integrators), ("zeros", zeros)):
+                if given is not None:
+                    raise TypeError(
+                        f"{stated} is for a state space or transfer function of "
+                        f"python-control, got {given} and {system!r:.200}"
+                    )
         if isinstance(system, System):
             return system
-        if isinstance(system, fmpq | Fraction | float | int | np.number | np.ndarray):
+        if is_triple:
+            return Controller(*system)
+        if is_number:
             return System(Sum.of(fmpq_poly([exact_number(name, system)])), _UNITY)
-        if not isinstance(system, Controller):
-            check_system(name, system, "a System, a number, a Controller")
-        k = rational(system)
-        return System(Sum.of(k.numerator.exact), Sum.of(k.denominator.exact))
+        above, below = _by_control(name, system, integrators, zeros)
+        return System(Sum.of(above), Sum.of(below))
 
     @property
     def is_equation(self) -> bool:
@@ -646,47 +660,120 @@ class System:
         squeeze : optional
             Without effect; ``control.evalfr`` passes it.
         """
-        found, s = self.given(values, numbers), complex_array("s", s)
+        given, s = self.given(values, numbers), complex_array("s", s)
         arrays = {
             k: np.array(float(v)) if isinstance(v, fmpq | Fraction) else real_array(k, v)
-            for k, v in found.items()
+            for k, v in given.items()
         }
-        if found and not any(v.ndim for v in arrays.values()):
-            return self.at(**{k: exact_number(k, v) for k, v in found.items()})(s)
         shape = broadcast_shape(("s", *arrays), (s, *arrays.values()))
-        s = np.broadcast_to(s, shape)
-        arrays = {k: np.broadcast_to(v, shape) for k, v in arrays.items()}
-        if self.is_equation:
-            return self.numerator.at(s, arrays)[0]
-        value, _ = self.quotient(s, arrays)
-        if not arrays and (s == 0.0).any():
-            value = np.where(s == 0.0, self._limit_at_zero(), value)
-        return value
+        point = [np.broadcast_to(v, shape) if v.ndim else float(v) for v in arrays.values()]
+        return self.values(np.broadcast_to(s, shape), point)[0]
 
-    def quotient(
-        self, s: ComplexArray, values: Mapping[str, FloatArray]
+    def values(
+        self, s: ComplexArray, point: Sequence[float | FloatArray]
     ) -> tuple[ComplexArray, FloatArray]:
-        """Evaluate N / M as `Sum.at` evaluates each of them, and bound the rounding errors."""
-        # In a unit as large as the roots of M: powers of many fast poles would overflow.
-        p = max(self.denominator.terms.values(), key=lambda p: p.degree())
-        ratio = abs(p[order(p.coeffs())] / p[p.degree()])
-        bits = ratio.p.bit_length() - ratio.q.bit_length()
-        unit = fmpq(2) ** (bits // max(p.degree(), 1))
-        size = abs(p[p.degree()]) * unit ** p.degree()
-        with np.errstate(all="ignore"):
-            (n, of_n), (m, of_m) = (
-                part.at(s, values, unit, size) for part in (self.numerator, self.denominator)
-            )
-            value = np.asarray(n / m)
-            return value, np.asarray((of_n + np.abs(value) * of_m) / np.abs(m))
+        """Evaluate at s, and bound rounding errors, see `armlock.engine.values`.
 
-    def _limit_at_zero(self) -> complex:
-        """Return the limit at s = 0; inf at a pole."""
-        number = _TERMS + max(self.numerator.degree, self.denominator.degree)
-        n, m = (part.series(number) for part in (self.numerator, self.denominator))
-        zero = fmpq(0), fmpq(1)
-        above, below = next((pair for pair in zip(n, m, strict=True) if any(pair)), zero)
-        return complex(rounded([above / below])[0] if below else np.inf)
+        Parameters
+        ----------
+        s : complex array, any shape
+            In rad/s.
+        point : sequence of float, or of float arrays, shaped like `s`
+            The parameters.
+        """
+        flat = s.ravel()
+        xs = [x.ravel() if isinstance(x, np.ndarray) else x for x in point]
+        try:
+            found, errors = self.affine.values(flat, xs)
+        except NotAffineError:
+            # Numbers are put in first, for all s of one point at once.
+            found, errors = np.empty(flat.shape, np.complex128), np.empty(flat.shape)
+            rows = np.column_stack([np.broadcast_to(x, flat.shape) for x in xs])
+            points, which = np.unique(rows, axis=0, return_inverse=True)
+            for k, row in enumerate(points.tolist()):
+                here = which.ravel() == k
+                affine = self.affine_in((), **dict(zip(self.parameters, row, strict=True)))
+                found[here], errors[here] = affine.values(flat[here], ())
+        return found.reshape(s.shape), errors.reshape(s.shape)
+
+    @cached_property
+    def affine(self) -> Affine:
+        """N and M as functions of the engine, affine in all parameters.
+
+        Raises
+        ------
+        NotAffineError
+            If they are not affine in all of them together.
+        """
+        return self.affine_in(self.parameters)
+
+    def affine_in(self, free: Sequence[str], **numbers: Any) -> Affine:
+        """Return N and M as functions of the engine, affine in the parameters that vary.
+
+        Parameters
+        ----------
+        free : sequence of str
+            The parameters that vary.
+        **numbers : real numbers, optional
+            Values of the others, which are nominal by default.
+
+        Raises
+        ------
+        NotAffineError
+            If two parameters that vary are multiplied, or one by itself.
+        """
+        origin = tuple(self.nominal.get(name) or 0.0 for name in free)
+        given = self.given((), {**dict.fromkeys(free, 0.0), **numbers})
+        put = {k: Sum.of(polynomial([v])) for k, v in given.items() if k not in free}
+        sums = [part.put(put) for part in (self.numerator, self.denominator)]
+        for _, names in chain(*(part.terms for part in sums)):
+            if len(names) > 1:
+                raise NotAffineError(
+                    f"the system must be affine in {' and '.join(dict.fromkeys(names))} "
+                    f"together, but holds {' * '.join(names)}: give a number for one of them, "
+                    "or make the product a parameter"
+                )
+        monomials = [(), *((name,) for name in free)]
+        n, m = ([part.before(*names) for names in monomials] for part in sums)
+        return Affine(n, m, tuple(free), origin, self.step, self.at_zero)
+
+    def functions(
+        self, values: Iterable[Any] = (), numbers: Mapping[str, Any] | None = None
+    ) -> tuple[Function, Function]:
+        """Return N and M at given values of the parameters, exactly."""
+        given = self.given(values, numbers or {})
+        point = {k: exact_number(k, v) for k, v in given.items()}
+        try:
+            return present(*self.affine.quotient(*point.values()))
+        except NotAffineError:
+            return self.affine_in((), **point).quotient()
+
+    def open_functions(
+        self, values: Iterable[Any], numbers: Mapping[str, Any], name: str = "loop"
+    ) -> tuple[Function, Function, FloatArray]:
+        """Return N and M of an open loop L = N / M, and the point of its parameters.
+
+        An equation D = 0 is refused: it has no open loop.
+        """
+        if self.is_equation:
+            raise TypeError(
+                f"{name} must be an open loop L, not an equation D = 0, got {self!r}: "
+                "`System.opened` gives the open loop of a parameter"
+            )
+        given = {k: real_number(k, v) for k, v in self.given(values, numbers).items()}
+        return *self.functions(given.values()), np.array(list(given.values()))
+
+    @property
+    def gain(self) -> float:
+        """Factor in front of (s - zeros) / (s - poles)."""
+        above, below = self.rational("gain")
+        return float(above.leading_coefficient() / below.leading_coefficient())
+
+    def rational(self, name: str = "system") -> tuple[fmpq_poly, fmpq_poly]:
+        """Return numerator and denominator of a system without delays and parameters."""
+        if self.parameters or self.longest_delay or self.is_equation:
+            raise ValueError(f"{name} must hold no delay and no parameter, got {self!r:.200}")
+        return self.numerator.whole(), self.denominator.whole()
 
     def __eq__(self, other: object) -> bool:
         """Whether both are the same expression: the same coefficients and delay objects."""
@@ -699,20 +786,19 @@ class System:
     def _content(self) -> tuple[Any, ...]:
         return self.numerator, self.denominator, self.nominal, self.step, self.at_zero
 
-    def __getstate__(self) -> tuple[Any, ...]:
-        """Return what makes the system."""
-        return self._content()
-
-    def __setstate__(self, state: tuple[Any, ...]) -> None:
-        """Take it back."""
-        self.numerator, self.denominator, self.nominal, self.step, self.at_zero = state
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what makes the system, without what is made of it."""
+        made = {
+            k for k in vars(self) if isinstance(getattr(type(self), k, None), cached_property)
+        }
+        return {k: v for k, v in vars(self).items() if k not in made}
 
     def _equation(self, latex: bool = False) -> str:
         """Return the equation as one writes it."""
-        above = self.numerator.text(latex)
+        above = written(self.numerator, latex)
         if self.is_equation:
             return f"{above} = 0"
-        below = self.denominator.text(latex)
+        below = written(self.denominator, latex)
         if latex:
             return above if below == "1" else rf"\frac{{{above}}}{{{below}}}"
         return above if below == "1" else f"[{above}] / [{below}]"
@@ -722,8 +808,14 @@ class System:
         return self._equation()
 
     def __repr__(self) -> str:
-        """Return a short text that says whether it is an open loop or an equation."""
+        """Return a short text: the factors as given, or an open loop, or an equation."""
+        if self.shown:
+            return self.shown
         text = self._equation()
+        is_rational = not (self.parameters or self.longest_delay or self.is_equation)
+        if len(text) > _LONGEST_RATIONAL and is_rational:
+            zeros, poles = (tuple(roots.tolist()) for roots in (self.zeros(), self.poles()))
+            return f"Controller(zeros={zeros}, poles={poles}, gain={self.gain})"
         if len(text) > _LONGEST_TEXT:
             terms = " over ".join(
                 f"{len(part.terms)} terms of degree {part.degree}"
@@ -873,17 +965,103 @@ def _reduced(n: Sum, m: Sum, powers: bool) -> tuple[Sum, Sum]:
     terms = [*n.terms.items(), *m.terms.items()]
     if not terms:
         raise ValueError("an equation must not be zero everywhere")
-    held = {d for (lag, _), _ in terms for d, _ in lag}
+    undelayed = [lag for (lag, _), _ in terms if not lag]
+    held = set() if undelayed else {d for (lag, _), _ in terms for d, _ in lag}
     early = Lag.of({d: -min(dict(lag).get(d, 0) for (lag, _), _ in terms) for d in held})
     if NOW not in {lag.times(early) for lag, _ in (m or n).terms}:
         raise ValueError(
             "the system must be causal: every term of its denominator is delayed by "
-            f"{' and '.join(sorted({_number(lag.time) for lag, _ in (m or n).terms}))} s"
+            f"{' and '.join(sorted({number(lag.time) for lag, _ in (m or n).terms}))} s"
         )
-    power = min(order(p.coeffs()) for _, p in terms) if powers else 0
+    power = 0
+    if powers and not [p for _, p in terms if p[0]]:
+        power = min([order(p.coeffs()) for _, p in terms])
     if not early and not power:
         return n, m
     return n.over(power, early), m.over(power, early)
+
+
+def Controller(zeros: Sequence[complex], poles: Sequence[complex], gain: float) -> System:
+    r"""Return a rational function K(s), given by its factors.
+
+    .. math::
+
+        K(s) = g\, \frac{\prod_i (s - z_i)}{\prod_i (s - p_i)}
+
+    Parameters
+    ----------
+    zeros, poles : sequence of complex
+        :math:`z_i` and :math:`p_i` in rad/s; complex ones in conjugate pairs.
+    gain : float
+        Factor :math:`g` in front, not zero.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not finite, complex ones do not come in conjugate pairs, or the gain
+        is zero.
+
+    Examples
+    --------
+    >>> from armlock import Controller
+    >>> lag = Controller(zeros=[-2.0], poles=[-1.0], gain=3.0)
+    >>> complex(lag(0.0))
+    (6+0j)
+    """
+    above, below = _factors("zeros", zeros), _factors("poles", poles)
+    gain = real_number("gain", gain)
+    if gain == 0.0:
+        raise ValueError("gain must not be zero: there would be no loop")
+    found = System(Sum.of(of_roots(above) * exact(gain)), Sum.of(of_roots(below)))
+    found.shown = f"Controller(zeros={above}, poles={below}, gain={gain})"
+    return found
+
+
+def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
+    """Return finite roots as a tuple, complex ones checked to come in pairs."""
+    roots = np.atleast_1d(complex_array(name, values))
+    if roots.ndim != 1:
+        raise ValueError(f"{name} must be one-dimensional, got shape {roots.shape}")
+    upper = np.sort_complex(roots[roots.imag > 0.0])
+    lower = np.sort_complex(roots[roots.imag < 0.0].conj())
+    if upper.size != lower.size or (np.abs(upper - lower) > 1e-12 * np.abs(lower)).any():
+        raise ValueError(f"{name} must be real or in conjugate pairs, got {values!r}")
+    return tuple(complex(root) for root in roots)
+
+
+def _by_control(
+    name: str, system: Any, integrators: int | None, zeros: int | None
+) -> tuple[fmpq_poly, fmpq_poly]:
+    """Return numerator and denominator of a system of python-control, or raise."""
+    import control
+
+    if not isinstance(system, control.TransferFunction | control.StateSpace):
+        raise TypeError(
+            f"{name} must be a System, a number, a triple (zeros, poles, gain), or a transfer "
+            f"function or state space of python-control, got {system!r:.200}"
+        )
+    if not system.issiso():
+        raise ValueError(
+            f"{name} must have one input and one output, got {system.ninputs} and "
+            f"{system.noutputs}: return_difference(plant, [k1 * delay(h), k2]) takes a plant "
+            "of several, with the delays in its controllers"
+        )
+    check_continuous(name, system)
+    if isinstance(system, control.StateSpace):
+        matrices = (real_array(name, getattr(system, letter)).tolist() for letter in "ABCD")
+        return statespace.of_matrices([*matrices], integrators, zeros)
+    above, below = (real_array(name, p[0][0])[::-1].tolist() for p in (system.num, system.den))
+    return statespace.of_coefficients(above, below, integrators, zeros)
+
+
+def check_continuous(name: str, system: Any) -> None:
+    """Raise if a system of python-control is in discrete time."""
+    if system.isdtime(strict=True):
+        raise ValueError(
+            f"{name} must be continuous in time, got sampling time {system.dt}: give the "
+            "continuous system from which it was sampled; for a controller that is born "
+            'discrete see the recipe "A digital controller"'
+        )
 
 
 def delay(theta: float | Fraction) -> System:
@@ -922,6 +1100,12 @@ def delay(theta: float | Fraction) -> System:
         raise ValueError(f"theta must not be negative, got {theta}")
     lag = Lag.of({Delay.new(value): 1}) if value else NOW
     return System(Sum.of(_ONE, lag), _UNITY)
+
+
+def lag_of(late: System) -> Lag:
+    """Return the delay of a system that `delay` made, which may be none."""
+    (((lag, _), _),) = late.numerator.terms.items()
+    return lag
 
 
 def delay_object(system: System, name: str) -> Delay:

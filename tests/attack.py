@@ -40,7 +40,6 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.affine import Affine
 from armlock.engine.decide import UNDECIDED
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.stability.semidiscretization import semi_discretization
@@ -191,7 +190,8 @@ def draw_paper(rng):
         (20.1, 19.9) if rng.random() < 0.5 else (between(rng, 5, 40), between(rng, 5, 40))
     )
     moved = [
-        [complex(r * 10.0 ** rng.normal(0.0, 0.05)) for r in rs] for rs in (k.zeros, k.poles)
+        [complex(r * 10.0 ** rng.normal(0.0, 0.05)) for r in rs]
+        for rs in (k.zeros(), k.poles())
     ]
     gain = k.gain * between(rng, 0.3, 3.0)
     delay = between(rng, 1e-6, 1e-2) if rng.random() < 0.3 else 0.0
@@ -609,7 +609,7 @@ def check_controls(tally, rng, sketch, loop, point):
     found = tally.ask("margins", margins, loop, *point)
     if found is None:
         return
-    quotient = Affine.of(loop).quotient(*point)
+    quotient = loop.affine.quotient(*point)
     for what in dense_judge.too_good_ones(*quotient, found, tally.controls):
         tally.note("controls", point, what, "no certificate")
 

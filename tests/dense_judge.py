@@ -8,7 +8,6 @@ import control
 import numpy as np
 
 from armlock import delay, margins, unstable_roots
-from armlock.affine import Affine
 from armlock.engine import decide
 from armlock.engine.chain import UndecidedError
 from tests import attack_judge, independent
@@ -184,7 +183,7 @@ def compared(
         equal = a == b or math.isclose(a, b, rel_tol=1e-5)
         if too_good or not equal:
             wrong.append(f"{name} {a} for {b}")
-    n, m = Affine.of(loop).quotient()
+    n, m = loop.affine.quotient()
     return found, wrong + too_good_ones(n, m, certified, controls)
 
 

@@ -64,8 +64,8 @@ def exact(system, s, x, y):
             for t, p in terms(system, x, y).items()
         )
     k, m = system.controller, system.mapping
-    gain = k.gain * mpmath.fprod(s - mpmath.mpc(zero) for zero in k.zeros)
-    gain /= mpmath.fprod(s - mpmath.mpc(pole) for pole in k.poles)
+    gain = k.gain * mpmath.fprod(s - mpmath.mpc(zero) for zero in k.zeros())
+    gain /= mpmath.fprod(s - mpmath.mpc(pole) for pole in k.poles())
     first, second, below = (
         mpmath.polyval(list(p), s, asc=True)
         for p in (m.numerator1, m.numerator2, m.denominator)

@@ -89,5 +89,13 @@ def sketch_of(loop):
     below = loop.mapping.denominator
     corner = below[1] / below[2] if loop.mapping.name == "dual" else 1.0
     return Sketch(
-        k.zeros, k.poles, k.gain, loop.mapping.name, tau1, tau2, loop.delay, corner, tau1 - tau2
+        k.zeros(),
+        k.poles(),
+        k.gain,
+        loop.mapping.name,
+        tau1,
+        tau2,
+        loop.delay,
+        corner,
+        tau1 - tau2,
     )

@@ -224,8 +224,8 @@ def test_responses_over_many_decades_are_those_of_talbots_method(name):
     def transform(s):
         k, m = loop.controller, loop.mapping
         above = polynomial(m.numerator1, s) + polynomial(m.numerator2, s)
-        value = k.gain * mpmath.fprod(s - z for z in k.zeros) * above
-        below = mpmath.fprod(s - p for p in k.poles) * polynomial(m.denominator, s)
+        value = k.gain * mpmath.fprod(s - z for z in k.zeros()) * above
+        below = mpmath.fprod(s - p for p in k.poles()) * polynomial(m.denominator, s)
         value *= mpmath.exp(-loop.delay * s) / below
         return value / (1 + value) / s
 
@@ -334,8 +334,7 @@ def test_at_zero_a_system_has_its_limit():
     assert response.frdata[0, 0, 0] == pytest.approx(2.0 / 3.0)
     assert CommonArm(gain=2.0)(0) == pytest.approx(80.0, rel=1e-14)
     assert CommonArm(gain=2.0)([0.0, 1j])[0] == pytest.approx(80.0, rel=1e-14)
-    with pytest.raises(ValueError, match="s must not be a pole of the open loop"):
-        CommonArm()(0, 0.9)
+    assert np.isinf(CommonArm()(0, 0.9))
 
 
 def test_terms_that_cancel_cost_no_digits():

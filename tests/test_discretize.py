@@ -62,7 +62,7 @@ CASES: dict[str, tuple[Any, Any, float, Any]] = {
     "unequal degrees": ((), (0.0,), 2.0, ((1.0,), (0.0,), (1.0,))),
     "many corners": ((0.0,), (-5e-6,), 2.0,
                      [with_roots(*np.multiply(CORNERS, share)) for share in (0.6, 1.4, 1.0)]),
-    "the paper's": (table_two().zeros, table_two().poles, 1e4,
+    "the paper's": (table_two().zeros(), table_two().poles(), 1e4,
                     [getattr(dual(2.5, 0.2), name)
                      for name in ("numerator1", "numerator2", "denominator")]),
 }  # fmt: skip

@@ -15,7 +15,6 @@ from armlock import (
     margins,
     unstable_roots,
 )
-from armlock.affine import Affine
 from armlock.engine import decide
 from armlock.sensors import COMMON, DIFFERENCE, dual
 from tests import independent
@@ -25,7 +24,7 @@ from tests.systems import two_delays
 def around(loop, start, direction, position, near=1e-6):
     """Count the unstable roots before and past a crossing."""
     points = start + position * np.outer([1.0 - near, 1.0 + near], direction)
-    return [decide.count(Affine.of(loop).function(*point)) for point in points]
+    return [decide.count(loop.affine.function(*point)) for point in points]
 
 
 def test_a_crossing_below_what_a_walk_in_polynomials_of_each_arm_sees_is_found():
@@ -34,7 +33,7 @@ def test_a_crossing_below_what_a_walk_in_polynomials_of_each_arm_sees_is_found()
     start, direction = np.array([1.0000024, 1.0000003518]), np.array([1.0, 1.0])
     found = first_crossing(loop, start, direction, 0.2)
     before, after = around(loop, start, direction, found.position)
-    assert decide.count(Affine.of(loop).function(*start)) == before > after >= 0
+    assert decide.count(loop.affine.function(*start)) == before > after >= 0
 
 
 @pytest.mark.parametrize("zeros", [(), (-0.5,)])

@@ -42,7 +42,7 @@ def test_parallel_branches_are_their_sum():
     other = Controller([], [0.0, -2.0 + 1j, -2.0 - 1j], -5.0)
     both = one + other
     # The pole at zero, which both have, is not doubled.
-    assert sorted(both.poles, key=abs) == [0.0, -1e-6, *other.poles[1:]]
+    assert sorted(both.poles(), key=abs) == [0.0, -1e-6, *other.poles()[1:]]
     s = 1j * np.geomspace(1e-9, 1e4, 60)
     np.testing.assert_allclose(both(s), one(s) + other(s), rtol=1e-13)
 

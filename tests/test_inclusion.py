@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from armlock.engine import inclusion
-from armlock.engine.chain import Lag
 from armlock.engine.functions import Function, Space, compiled
 from armlock.engine.inclusion import EPSILON
-from armlock.engine.polynomials import Polynomial, exact
+from armlock.engine.polynomials import Polynomial, exact, of_roots
+from armlock.systems import Lag
 
 mp = mpmath.mp.clone()
 mp.dps = 50
@@ -48,7 +48,7 @@ def draw_polynomial(rng, degree):
             roots += [pair, pair.conjugate()]
         else:
             roots.append(complex(rng.choice([-1.0, 1.0, 0.0]) * near))
-    p = Polynomial.of_roots(roots, rng.normal())
+    p = Polynomial.of(of_roots(roots) * exact(rng.normal()))
     return Polynomial.of(p.coefficients.tolist()) if rng.random() < 0.4 else p
 
 
@@ -177,12 +177,12 @@ def test_enclosures_hold_on_intervals_and_on_parts_of_them():
 def test_a_factor_of_each_power_reaches_the_remainder():
     # (s - z)^4 has a constant fourth derivative: its remainder is the bound.
     for roots in ([-1e-3] * 4, [-1e-3] * 3 + [-1.0], [-2.0] * 7):
-        function = function_of(Space([Polynomial.of_roots(roots)], []), [1], [[]])
+        function = function_of(Space([Polynomial.of(of_roots(roots))], []), [1], [[]])
         work = workspace(function.space.arrays, 1)
         enclosed(function, 1.0, 0.3, work)
         assert share_of_bound(function, Exact(function), 1.0, 0.3, work, 1.0) <= 1.0
     # A part of a long piece keeps its remainder, here with an exponential on the part.
-    space = Space([Polynomial.of_roots([-1.0] * 4)], after([1]))
+    space = Space([Polynomial.of(of_roots([-1.0] * 4))], after([1]))
     function = function_of(space, [0], [[1]])
     exact, work = Exact(function), workspace(function.space.arrays, 1)
     for middle, half in ((1.0, 0.5), (1.4, 0.1), (1.45, 0.05)):

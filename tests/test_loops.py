@@ -15,7 +15,6 @@ from armlock import (
     paper_loop,
     unstable_roots,
 )
-from armlock.affine import Affine
 from armlock.controllers import integrating_actuator
 from armlock.engine.functions import at
 from armlock.paper import DUAL_SENSOR_CORNER
@@ -124,13 +123,12 @@ def test_a_controller_in_place_of_a_gain_is_told_what_to_write(arm, controller):
 
 def test_what_is_missing_is_named():
     with pytest.raises(TypeError, match=r"^mapping must be .* as in Loop\(controller, 's"):
-        Loop(K, 20.0, 20.0)
+        Loop(K, 20.0, 20.0)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"^tau2 must be given: the signal mapping 'common'"):
         Loop(K, "common", tau1=20.0)
     with pytest.raises(ValueError, match=r"^mapping must be .* 'modified dual'; got 'triple'"):
         Loop(K, "triple", tau1=20.0)
-    with pytest.raises(ValueError, match=r"^s must not be a pole of the open loop, got 0"):
-        DualArm()([1j, 0.0])
+    assert np.isinf(DualArm()([1j, 0.0])).tolist() == [False, True]
 
 
 def test_next_to_equal_parameters_the_response_keeps_its_digits():
@@ -139,5 +137,5 @@ def test_next_to_equal_parameters_the_response_keeps_its_digits():
     loop = DualArm(gain=1.0, corner=0.7)
     with mpmath.workdps(50):
         expected = complex(independent.exact(loop, mpmath.mpc(0, omega), c1, c2) - 1)
-    above, below = at(Affine.of(loop).quotient(c1, c2), [omega])
+    above, below = at(loop.affine.quotient(c1, c2), [omega])
     assert (above / below)[0] == pytest.approx(expected, rel=1e-12)

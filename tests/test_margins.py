@@ -35,15 +35,14 @@ from armlock import (
     unstable_roots,
     varying_radius,
 )
-from armlock.affine import Affine
 from armlock.engine import chain, polynomials
-from armlock.engine.chain import Delay, Lag
 from armlock.engine.decide import count
 from armlock.engine.functions import common_zeros
 from armlock.engine.margins import gain_limits
-from armlock.engine.polynomials import Polynomial
+from armlock.engine.polynomials import Polynomial, of_roots
 from armlock.robustness import perturbations
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
+from armlock.systems import Delay, Lag
 from tests import independent
 from tests.attack import Tally, check_margins, to_loop
 from tests.systems import sketch_of
@@ -226,7 +225,7 @@ def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(
             point = [
                 1 + polynomials.exact(share * eps) * polynomials.exact(d) for d in direction
             ]
-            n, m = Affine.of(loop).quotient(*point)
+            n, m = loop.affine.quotient(*point)
             found.append(count(n + m, common_zeros(n, m)))
         assert found == [0, 0, 0, 2]
 
@@ -365,7 +364,7 @@ def test_an_all_pass_just_below_unity_gain_is_stable_up_to_unity_gain(gain):
     all_pass = Controller([1.0], [-1.0], gain)
     loop = Loop(all_pass, SINGLE, 1.0, 1.0, delay=0.5)
     assert unstable_roots(loop, 0.0) == 0
-    lower, upper = gain_limits(*Affine.of(loop).quotient(0.0, 1.0))
+    lower, upper = gain_limits(*loop.affine.quotient(0.0, 1.0))
     assert (lower.t, upper.omega) == (np.inf, np.inf)
     assert upper.t == pytest.approx(1.0 / gain, rel=1e-14)
 
@@ -519,7 +518,7 @@ def test_the_size_of_all_coefficients_changes_no_number(polynomial, gains, lags,
 def test_coefficients_that_are_no_floats_keep_their_roots(size):
     # The lowest of them is 1e-367 or 1e433.
     poles = -size * 1.5 ** np.arange(20)
-    found = Polynomial.of(Polynomial.of_roots(poles).exact)
+    found = Polynomial.of(of_roots(poles))
     assert np.sort(np.real(found.roots)) == pytest.approx(np.sort(poles), rel=1e-6)
 
 
@@ -630,7 +629,7 @@ def test_a_gain_up_to_which_shared_objects_are_shown_to_be_confined_is_a_bound()
     """s (1 + k (0.6 z + 0.3 z^2)): the sum of magnitudes is one at k = 1 / 0.9."""
     z = delay(1.0)
     loop = (0.6 * z + 0.3 * z**2) * (s + 1) / (s + 2)
-    _, above = gain_limits(*Affine.of(loop).quotient())
+    _, above = gain_limits(*loop.affine.quotient())
     assert above.t == pytest.approx(1.0 / 0.9, rel=1e-12)
     assert above.is_bound
     # The chain is lost where both roots of 1 + k (0.6 z + 0.3 z^2) are on the unit circle.

@@ -37,8 +37,8 @@ def test_before_the_light_comes_back_a_loop_without_an_integrator_follows_its_co
 ):
     """Then Y of a single arm is -K / (1 + K), and half of that for the sum."""
     time = np.linspace(0.0, 32.0, 65)
-    above = controller.gain * np.poly(controller.zeros)
-    below = np.polyadd(np.poly(controller.poles), above)
+    above = controller.gain * np.poly(controller.zeros())
+    below = np.polyadd(np.poly(controller.poles()), above)
     _, expected = signal.step((above.real, below.real), T=time)
     found = pulling(Loop(controller, SINGLE, 33.0, 33.0), time[1:], common=STEP)
     np.testing.assert_allclose(found, -0.5 * expected[1:], rtol=2e-3, atol=1e-6)

@@ -219,7 +219,7 @@ def test_a_root_next_to_zero_is_that_of_the_factored_loop():
         (paper_loop(actuator=True, delay=1e-6), (1.000015, 1.00001)),
         # The roots tend to the limit of the chain, and none of them reaches it.
         (
-            Loop((PAPER.zeros, PAPER.poles[:-1], 1e4), dual(2.5, 20.016), 30.013, 9.997),
+            Loop((PAPER.zeros(), PAPER.poles()[:-1], 1e4), dual(2.5, 20.016), 30.013, 9.997),
             (1.0, 1.0),
         ),
         # Far up the chain, to the right of slow ones.

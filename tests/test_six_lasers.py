@@ -92,9 +92,9 @@ def test_the_determinant_of_all_lasers_is_the_loop_times_the_locks(tree):
 def rational(controller, s):
     """Evaluate a controller, factor by factor."""
     value = np.full(s.shape, controller.gain, dtype=complex)
-    for zero in controller.zeros:
+    for zero in controller.zeros():
         value *= s - zero
-    for pole in controller.poles:
+    for pole in controller.poles():
         value /= s - pole
     return value
 

@@ -26,7 +26,6 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.affine import Affine
 from armlock.engine.margins import chain_limit
 from armlock.sensors import DIFFERENCE
 from armlock.stability import crossings
@@ -171,11 +170,11 @@ class TestOtherLoops:
         system = NEUTRAL[name]
         assume(dx or dy)
         start, way = 0.1 * np.array([x, y]), 0.01 * np.array([dx, dy])
-        _, first, second = Affine.of(system).terms
+        _, first, second = system.affine.terms
         change = first * way[0] + second * way[1]
-        limit = min(chain_limit(Affine.of(system).function(*start), change, 0.0), 1e12)
+        limit = min(chain_limit(system.affine.function(*start), change, 0.0), 1e12)
         near = [start + limit * share * way for share in (1.0 - 1e-9, 1.0 + 1e-9)]
-        inside, outside = (Affine.of(system).function(*point).confined for point in near)
+        inside, outside = (system.affine.function(*point).confined for point in near)
         assert inside or limit == 0.0
         assert not outside or limit == 1e12
 
@@ -344,7 +343,7 @@ def test_where_rounding_hides_all_crossings_few_intervals_are_kept(monkeypatch):
     # N is c2 times M, but for a part in 1e16: each step leaves an interval undecided.
     monkeypatch.setattr(crossings, "_MOST_STEPS", 20_000)
     loop = Loop(Controller([], [-1.0], 1e16), DIFFERENCE, 20.0, 20.0)
-    constant, first, second = Affine.of(loop).terms
+    constant, first, second = loop.affine.terms
     functions = constant, second * -1, first * -1
     y, one = np.array([0.5, 0.6]), np.ones(2)
     found = crossings.crossings(functions, y, -one, one, 1e4 * one)

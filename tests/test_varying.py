@@ -33,7 +33,6 @@ from armlock import (
     unstable_roots,
     varying_radius,
 )
-from armlock.affine import Affine
 from armlock.engine import decide
 from armlock.engine.decide import Family
 from armlock.engine.inclusion import TERM, VERTEX
@@ -88,7 +87,7 @@ def test_no_level_that_is_too_good_is_certified():
     rng, number = np.random.default_rng(22), 0
     while number < 12:
         system = system_of(*draw(rng)[1:])
-        n, d = Affine.of(system).quotient()
+        n, d = system.affine.quotient()
         if decide.count(d) != 0:
             continue
         number += 1

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property
-from typing import NamedTuple, Self
-from uuid import uuid4
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from flint import fmpq
 
 from armlock.checks import ComplexArray, FloatArray
-from armlock.engine.polynomials import collected, rounded
+from armlock.engine.polynomials import rounded
+
+if TYPE_CHECKING:
+    from armlock.systems import Delay, Lag
 
 # On the torus a P that is smaller than this share of its coefficients is zero; and where a
 # candidate is looked for.
@@ -35,62 +36,14 @@ class UndecidedError(RuntimeError):
     """Double precision, or the steps allowed, did not decide."""
 
 
-class Delay(NamedTuple):
-    """A delay object: theta in s, and the mark by which it differs from all others.
-
-    Two objects are two delays even if they are equally long: a small change of one of them
-    alone is a small change of the loop. The mark is the same in other processes.
-    """
-
-    theta: fmpq
-    mark: str
-
-    @classmethod
-    def new(cls, theta: fmpq) -> Self:
-        """Return an object that is none other."""
-        return cls(theta, uuid4().hex)
-
-    def __hash__(self) -> int:
-        """Hash the mark alone: python-flint's fractions take long."""
-        return hash(self.mark)
-
-
-class Lag(tuple[tuple[Delay, int], ...]):
-    """A product of delay objects: pairs of an object and its power, sorted."""
-
-    @classmethod
-    def of(cls, powers: Mapping[Delay, int]) -> Self:
-        """Return the product of objects to these powers."""
-        return cls(sorted((delay, n) for delay, n in powers.items() if n))
-
-    @classmethod
-    def after(cls, theta: fmpq, mark: str = "") -> Self:
-        """Return one object of a length, by default the one that all of this length share."""
-        return cls([(Delay(theta, mark), 1)] if theta else [])
-
-    def times(self, other: Lag) -> Lag:
-        """Return the product of two."""
-        if not (self and other):
-            return self or other
-        return Lag.of(collected((*self, *other)))
-
-    @cached_property
-    def time(self) -> fmpq:
-        """The delay of the product, in s."""
-        return sum((delay.theta * n for delay, n in self), fmpq(0))
-
-
-#: The product of no delays.
-NOW = Lag()
-
-
 def own_phases(lags: Iterable[Lag]) -> tuple[list[Lag], list[Lag]]:
     """Return the products whose phase is free, and those that are left.
 
     The phase of a product with an object of its own is free, whatever all others are. Taken
     out, it may leave others with an object of their own.
     """
-    left, free = [lag for lag in lags if lag], list[Lag]()
+    left: list[Lag] = [lag for lag in lags if lag]
+    free: list[Lag] = []
     while True:
         used = Counter(delay for lag in left for delay, _ in lag)
         own = [lag for lag in left if any(used[delay] == 1 for delay, _ in lag)]
@@ -135,10 +88,10 @@ def _on_torus(
     return kept
 
 
-def _powers(lags: Iterable[Lag]) -> FloatArray:
+def _powers(lags: Iterable[Sequence[tuple[Delay, int]]]) -> FloatArray:
     """Return the powers of all delay objects in some products, shape (products, objects)."""
     lags = list(lags)
-    objects = sorted({d for lag in lags for d, _ in lag})
+    objects = sorted({d for lag in lags for d, _ in lag}, key=lambda d: d.mark)
     return np.array([[dict(lag).get(d, 0) for d in objects] for lag in lags], np.float64)
 
 
@@ -163,7 +116,7 @@ def _loosened(
     own, left = own_phases(lag for lag, k in acting for c in rows[:, k] if c)
     kept = [0, *(k for lag, k in acting if lag in left)]
     size = sum(float(np.abs(rows[:, k]).sum()) for lag, k in acting if lag in own)
-    return rows[:, kept], _powers([NOW, *(lags[k - 1] for k in kept[1:])]), size
+    return rows[:, kept], _powers([(), *(lags[k - 1] for k in kept[1:])]), size
 
 
 def arc_reserve(

@@ -14,17 +14,19 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from flint import fmpq
+from flint import acb, acb_poly, fmpq
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray
 from armlock.engine import chain, inclusion
-from armlock.engine.chain import Lag
 from armlock.engine.inclusion import EPSILON, Arrays
-from armlock.engine.polynomials import Polynomial, exact, order, rounded
+from armlock.engine.polynomials import Polynomial, exact, order, polynomial, rounded
+
+if TYPE_CHECKING:
+    from armlock.systems import Lag
 
 Exact = npt.NDArray[np.object_]
 # Most coefficients of a series at s = 0 of which one has to differ from zero.
@@ -382,6 +384,20 @@ class Function:
             slope += dp * g - p * ((1.0 + turn) @ (delays * delayed[j]))
         return value, slope
 
+    def in_ball(self, s: acb) -> acb:
+        """Evaluate at a ball of python-flint, with its context's precision."""
+        found, turns = acb(0), [(-s * theta).exp() - 1 for theta in self.space.delays]
+        for p, steady, row in zip(
+            self.space.polynomials, self.steady, self.delayed, strict=True
+        ):
+            total = acb(steady)
+            for weight, turn in zip(row, turns, strict=True):
+                if weight:
+                    total += turn * weight
+            if steady or any(row):
+                found += acb_poly(p.exact)(s) * total
+        return found
+
     def shifted(self, sigma: float) -> tuple[Space, inclusion.Functions]:
         """Return the function s -> F(s + sigma): its space, and its weights.
 
@@ -398,9 +414,13 @@ class Function:
                     sizes = (np.abs(np.array(p.roots)[k]) + abs(sigma)) / np.abs(roots[k])
                 sizes[np.isnan(sizes)] = 1.0
                 missed *= float(np.maximum(sizes, 1.0).prod())
-            moved = Polynomial(p.lead, tuple(roots.tolist()), p.computed, (), missed)
+            moved = p.exact(polynomial([sigma, 1]))
             # Next to a root that was computed, the roots are computed again.
-            polynomials.append(p.shifted(sigma) if missed > _MOST_MISSED else moved)
+            polynomials.append(
+                Polynomial.of(moved)
+                if missed > _MOST_MISSED
+                else Polynomial(moved, tuple(roots.tolist()), p.computed, missed)
+            )
         space = Space(polynomials, self.space.lags, self.space.step)
         steady, delayed = self.weights
         change = np.expm1(-sigma * space.arrays.delays)

@@ -6,7 +6,6 @@ import copyreg
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from itertools import zip_longest
 from operator import mul
 from typing import Any, TypeVar
 
@@ -14,7 +13,7 @@ import flint
 import numpy as np
 from flint import fmpq, fmpq_poly
 
-from armlock.checks import ComplexArray, FloatArray
+from armlock.checks import FloatArray
 from armlock.engine.inclusion import EPSILON
 
 _Key = TypeVar("_Key")
@@ -35,33 +34,29 @@ class Polynomial:
 
     Attributes
     ----------
-    lead : fmpq
-        The highest coefficient.
+    exact : fmpq_poly
+        The polynomial of python-flint.
     roots : tuple of complex
-        In conjugate pairs. They define the polynomial, or were computed.
+        In conjugate pairs.
     computed : frozenset of int
-        Places of the roots that were computed; the others are exact.
-    factors : tuple of tuple of fmpq
-        The monic polynomials of which the computed roots are those, ascending.
+        Places of the roots that are rounded; the others are exact.
     missed : float
         By how much the polynomial that has the computed roots is missed at any s, over the
         product of abs(s) + abs(root) of these roots.
     """
 
-    lead: fmpq
+    exact: fmpq_poly
     roots: tuple[complex, ...]
     computed: frozenset[int] = frozenset()
-    factors: tuple[tuple[fmpq, ...], ...] = ()
     missed: float = 0.0
 
     @classmethod
     def of(cls, coefficients: fmpq_poly | Iterable[Any]) -> Polynomial:
         """Return the polynomial with these coefficients, ascending; zero has degree 0."""
-        left = polynomial(coefficients)
-        if not left:
-            return cls(fmpq(0), ())
-        lead, known, computed = left.leading_coefficient(), [], []
-        left /= lead
+        p = polynomial(coefficients)
+        if not p:
+            return cls(p, ())
+        left, known, computed = p / p.leading_coefficient(), [], []
         for root, number in _roots(left):
             factor = _factor(root) ** number
             pair = [root, root.conjugate()] if root.imag else [root]
@@ -70,40 +65,22 @@ class Polynomial:
             else:
                 left //= factor
                 known += pair * number
-        return cls(
-            lead,
-            (*known, *computed),
-            frozenset(range(len(known), len(known) + len(computed))),
-            (tuple(left.coeffs()),) if computed else (),
-            # Each of them is rounded by half an EPSILON.
-            0.51 * EPSILON * len(computed),
-        )
-
-    @classmethod
-    def of_roots(cls, roots: Iterable[complex], lead: float = 1.0) -> Polynomial:
-        """Return the polynomial with these roots, which come in conjugate pairs."""
-        return cls(exact(lead), tuple(complex(root) for root in roots))
-
-    def __mul__(self, other: Polynomial) -> Polynomial:
-        """Return the product, with the roots of both."""
-        if not (self and other):
-            return Polynomial(fmpq(0), ())
-        moved = frozenset(len(self.roots) + k for k in other.computed)
-        return Polynomial(
-            self.lead * other.lead,
-            self.roots + other.roots,
-            self.computed | moved,
-            self.factors + other.factors,
-            (1.0 + self.missed) * (1.0 + other.missed) - 1.0,
-        )
+        places = range(len(known), len(known) + len(computed))
+        # Each of them is rounded by half an EPSILON.
+        return cls(p, (*known, *computed), frozenset(places), 0.51 * EPSILON * len(computed))
 
     def __bool__(self) -> bool:
         """Whether it is not zero."""
-        return self.lead != 0
+        return bool(self.exact)
 
     def __repr__(self) -> str:
         """List the coefficients."""
         return repr(self.coefficients.tolist())
+
+    @cached_property
+    def lead(self) -> fmpq:
+        """The highest coefficient."""
+        return self.exact.leading_coefficient() if self.exact else fmpq(0)
 
     @property
     def degree(self) -> int:
@@ -116,44 +93,9 @@ class Polynomial:
         return self.roots.count(0j)
 
     @cached_property
-    def exact(self) -> fmpq_poly:
-        """The polynomial of python-flint."""
-        given = [root for k, root in enumerate(self.roots) if k not in self.computed]
-        known = [_factor(root) for root in given if root.imag >= 0.0]
-        found = reduce(mul, map(polynomial, self.factors), polynomial([self.lead]))
-        return reduce(mul, known, found)
-
-    @cached_property
     def coefficients(self) -> FloatArray:
         """Coefficients in ascending powers of s, rounded; inf where a number overflows."""
         return rounded(self.exact.coeffs() or [fmpq(0)])
-
-    def shifted(self, sigma: float) -> Polynomial:
-        """Return p(s + sigma), from its coefficients."""
-        return Polynomial.of(self.exact(polynomial([sigma, 1])))
-
-    def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
-        """Evaluate p(s) / q(s), factor by factor."""
-        return quotients(self.roots, other.roots, float(self.lead / other.lead), s)
-
-
-@np.errstate(under="ignore")
-def quotients(
-    zeros: Sequence[complex], poles: Sequence[complex], lead: float, s: ComplexArray
-) -> ComplexArray:
-    """Evaluate `lead` times the product of s - zeros over that of s - poles, at any s."""
-    found = np.full(s.shape, complex(lead))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        flat = found.reshape(-1), s.reshape(-1)
-        for first in range(0, s.size, _BLOCK):
-            value, at = (x[first : first + _BLOCK] for x in flat)
-            # In turn, so that the product neither overflows nor underflows on the way.
-            for zero, pole in zip_longest(zeros, poles):
-                if zero is not None:
-                    value *= at - zero
-                if pole is not None:
-                    value /= at - pole
-    return found
 
 
 def exact(value: Any) -> fmpq:
@@ -188,6 +130,11 @@ def on_axis(p: fmpq_poly, q: fmpq_poly) -> fmpq_poly:
     """Return Re(p conj(q)) at s = j omega as a polynomial of omega^2."""
     product = p * q(polynomial([0, -1]))
     return fmpq_poly([(-1) ** k * c for k, c in enumerate(product.coeffs()[::2])])
+
+
+def of_roots(roots: Iterable[complex]) -> fmpq_poly:
+    """Return the monic polynomial with these roots, which come in conjugate pairs."""
+    return reduce(mul, (_factor(root) for root in roots if root.imag >= 0.0), fmpq_poly([1]))
 
 
 def _factor(root: complex) -> Any:

@@ -18,7 +18,7 @@ import flint
 from flint import fmpq, fmpq_poly
 
 from armlock.checks import whole_number
-from armlock.engine.polynomials import Polynomial, exact
+from armlock.engine.polynomials import Polynomial, exact, polynomial
 
 #: What rounding makes of a determinant: at most this share of sum |a_ij cofactor_ij|. It covers
 #: all changes of coordinates that were drawn, of two to five states.
@@ -85,7 +85,7 @@ def settled(
             raise ValueError(
                 f"rounding hides whether more than {after} {_COUNTED[name]} are at s = 0: "
                 "state how many are meant, 0 if the numbers hold as they are, by "
-                "Controller.of(system, integrators=0, zeros=0), state_space(..., "
+                "System.of(system, integrators=0, zeros=0), state_space(..., "
                 "integrators=0, zeros=0), or at_zero=0 of an equation, determinant or "
                 "return_difference; or give its factors, Controller(zeros, poles, gain)"
             )
@@ -94,33 +94,27 @@ def settled(
 
 def of_matrices(
     matrices: Sequence[Any], integrators: int | None, zeros: int | None
-) -> tuple[Polynomial, Polynomial]:
+) -> tuple[fmpq_poly, fmpq_poly]:
     """Return numerator and denominator of C (s - A)^-1 B + D of matrices of floats."""
     a, b, c, ((d,),) = matrices
     if not len(a):
-        return Polynomial.of([d]), Polynomial.of([1])
+        return polynomial([d]), polynomial([1])
     first, column, row, through = _matrix(a), _matrix(b), _matrix(c), exact(d)
     coefficients, adjugates = _cofactors(first)
     below = fmpq_poly(coefficients)
     above = (first - column * row).charpoly() - below + through * below
     bounds = _bounds(below, adjugates, first), _bounds_of_zeros(a, b, c, d, above)
-    found = _quotient(above, below, through, (integrators, zeros), bounds)
-    return Polynomial.of(found[0]), Polynomial.of(found[1])
+    return _quotient(above, below, through, (integrators, zeros), bounds)
 
 
 def of_coefficients(
     above: Any, below: Any, integrators: int | None, zeros: int | None
-) -> tuple[Polynomial, Polynomial]:
+) -> tuple[fmpq_poly, fmpq_poly]:
     """Return a quotient of polynomials that were multiplied out, in ascending powers."""
-    given = Polynomial.of(above), Polynomial.of(below)
-    above, below = (p.exact for p in given)
+    above, below = polynomial(above), polynomial(below)
     through = above[below.degree()] / below.leading_coefficient()
-    bounds = _bounds_of_product(given[1]), _bounds_of_product(given[0])
-    found = _quotient(above, below, through, (integrators, zeros), bounds)
-    one, other = (
-        p if p.exact == q else Polynomial.of(q) for p, q in zip(given, found, strict=True)
-    )
-    return one, other
+    bounds = _bounds_of_product(Polynomial.of(below)), _bounds_of_product(Polynomial.of(above))
+    return _quotient(above, below, through, (integrators, zeros), bounds)
 
 
 def _quotient(

@@ -8,15 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import ComplexArray, one_of
+from armlock.checks import ComplexArray
 from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import unstable_roots
-
-_ARMS = "arm 1", "arm 2"
-_HALVES = "common", "differential"
 
 
 def transfer(
@@ -54,7 +50,7 @@ def transfer(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, there is no such input, or s is a pole of the open loop.
+        If `loop` is no `Loop`, there is no such input, or s is not finite.
 
     Examples
     --------
@@ -62,19 +58,19 @@ def transfer(
     >>> print(f"{abs(transfer(flight_loop(), 'laser', 2j * 3.141592653589793 * 3e-3)):.2e}")
     1.13e-05
     """
-    one_of("source", source, ("laser", *_ARMS, *_HALVES))
-    return responses(loop, s, [source])[source]
+    return checked_loop(loop).response(source)(s)
 
 
 def responses(loop: Loop, s: npt.ArrayLike, sources: Sequence[str]) -> dict[str, ComplexArray]:
     """Evaluate the responses to several inputs, as `transfer` gives them one by one."""
+    # The loop is evaluated once for all of them.
     sensitivity = 1.0 / (1.0 + checked_loop(loop)(s))
-    found = {"laser": np.asarray(sensitivity)}
-    for names, errors in (_ARMS, Loop.arm_responses), (_HALVES, Loop.half_responses):
-        if set(names) & set(sources):
-            for name, error in zip(names, errors(loop, s), strict=True):
-                found[name] = np.asarray(-error * sensitivity)
-    return {source: found[source] for source in sources}
+    found = {
+        source: -path(s) * sensitivity
+        for source, path in loop.paths.items()
+        if source in sources
+    }
+    return {"laser": sensitivity, **found}
 
 
 def require_stable(loop: Loop) -> None:

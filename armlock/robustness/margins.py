@@ -13,10 +13,9 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy.typing as npt
 
-from armlock.affine import Affine, open_quotient
 from armlock.checks import positive_number, real_number
 from armlock.engine import decide
-from armlock.engine.chain import Lag, UndecidedError
+from armlock.engine.chain import UndecidedError
 from armlock.engine.functions import Function, common_zeros
 from armlock.engine.margins import (
     Free,
@@ -30,7 +29,7 @@ from armlock.engine.margins import (
 from armlock.loops import checked_loop
 from armlock.robustness.many import many
 from armlock.stability.counts import decided
-from armlock.systems import Sum, System, delay_object
+from armlock.systems import Lag, Sum, System, delay_object
 from armlock.tables import Table, as_html, as_text, at, decibels, number
 
 _T = TypeVar("_T")
@@ -47,7 +46,7 @@ def _certified(
     numbers: dict[str, npt.ArrayLike],
 ) -> _T:
     """Return what the engine makes of numerator and denominator of a loop."""
-    n, m, point = open_quotient(loop, values, numbers)
+    n, m, point = System.of(loop, "loop").open_functions(values, numbers)
     with decided("no margin", point):
         return compute(n, m)
 
@@ -177,8 +176,8 @@ def peak_gain(system: Any, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> 
     >>> print(f"{gain:.4f} at {omega:.3e} rad/s")
     1.6246 at 2.291e-05 rad/s
     """
-    n, d, point = open_quotient(system, values, numbers, "system")
     given = System.of(system, "system")
+    n, d, point = given.open_functions(values, numbers, "system")
     held = given.at(**dict(zip(given.parameters, point.tolist(), strict=True)))
     if held.numerator.degree > held.denominator.degree:
         raise ValueError(
@@ -292,6 +291,6 @@ def _with_free_phases(system: System, arms: tuple[System, System], above: float)
         arm = (names[kinds[lag]],) if kinds[lag] else ()
         above_line = above_line + Sum.of(p, own, *arm)
     turned = dict.fromkeys(names.values(), 0.0)
-    affine = Affine(System(above_line, system.denominator, turned), tuple(turned))
+    affine = System(above_line, system.denominator, turned).affine
     discs = tuple(f for f in affine.n[1:] if not f.is_zero)
     return Free(affine.n[0], affine.m[0], discs, above)

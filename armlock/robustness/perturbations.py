@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import fmpq
 
-from armlock.affine import Affine, NotAffineError
 from armlock.checks import FloatArray, finite_series, positive_number, real_number
 from armlock.engine import decide
-from armlock.engine.chain import NOW, Delay, Lag
+from armlock.engine.affine import Affine, NotAffineError
 from armlock.engine.decide import BOUNDARY, UNCONFINED, Family
 from armlock.engine.functions import Function, common_zeros
 from armlock.engine.inclusion import EPSILON, TERM, VERTEX
@@ -26,7 +25,7 @@ from armlock.engine.polynomials import collected, exact, polynomial, rounded
 from armlock.loops import Loop, checked_loop
 from armlock.robustness.many import many
 from armlock.stability.counts import CountError, decided, unstable_roots
-from armlock.systems import Sum, System, delay_object
+from armlock.systems import NOW, Delay, Lag, Sum, System, delay_object
 from armlock.tables import Table, as_html, as_text, at, number
 
 #: Numbers in the order of the parameters, or by name.
@@ -103,7 +102,7 @@ class _Ray:
             np.hypot.reduce(self.way)
         )
         try:
-            affine = Affine.of(system)
+            affine = system.affine
             self.n, self.m = affine.quotient(*self.start.tolist())
             moved = [_along(part, self.way) * self.scale for part in (affine.n, affine.m)]
             if not any(f.size_at_infinity for f in (self.n, self.m, *moved)):
@@ -120,7 +119,7 @@ class _Ray:
     def _along(system: System, way: dict[str, float]) -> Affine:
         """Return a system, affine in the parameter of the ray, or say what is multiplied."""
         try:
-            return Affine(system, ("u",))
+            return system.affine_in(("u",))
         except NotAffineError:
             raise NotAffineError(
                 "direction must change parameters that are not multiplied with each other or "
@@ -370,7 +369,7 @@ def box_count(loop: System, size: float | Mapping[str, float]) -> int:
         size = dict.fromkeys(system.parameters, positive_number("size", size))
     half = {name: positive_number(name, value) for name, value in size.items()}
     at = {name: real_number(name, value) for name, value in system.given((), {}).items()}
-    affine = Affine.of(system) if set(half) == set(at) else Affine(system, tuple(half))
+    affine = system.affine if set(half) == set(at) else system.affine_in(tuple(half))
     half = {name: half[name] for name in affine.free}
     n, m = affine.quotient(*(at[name] for name in half))
     centre, terms = n + m, affine.terms[1:]
@@ -484,7 +483,7 @@ class _Arms:
         names = [Sum.of(polynomial([1]), NOW, name) for name in ("both", "apart")]
         whole = d0 + d12 * middle * middle + both * names[0] + apart * names[1]
         nominal = {"both": 1.0, "apart": 0.0}
-        rest, plus, minus = Affine(System(whole, Sum({}), nominal), tuple(nominal)).terms
+        rest, plus, minus = System(whole, Sum({}), nominal).affine.terms
         self.functions = [rest + plus, plus, minus * -1]
 
     def moved(self, system: System, x: float) -> System:
@@ -504,7 +503,7 @@ class _Arms:
 
     def function(self, part: Sum, x: float = 0.0) -> Function:
         """Return a sum with the two delays moved."""
-        return Affine(self.moved(System(part, Sum({})), x)).n[0]
+        return self.moved(System(part, Sum({})), x).affine.n[0]
 
     def no_root_crosses(self, low: float, high: float) -> bool:
         """Tell whether no root crosses the axis in between; False decides nothing."""

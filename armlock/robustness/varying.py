@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 from flint import fmpq, fmpq_poly
 
-from armlock.affine import Affine
 from armlock.checks import FloatArray, real_number
 from armlock.engine import chain, decide
 from armlock.engine.chain import UndecidedError
@@ -25,7 +24,14 @@ from armlock.engine.decide import Family
 from armlock.engine.functions import Function, Space, at, common_zeros, stacked
 from armlock.engine.inclusion import VERTEX
 from armlock.engine.margins import decided_ratio, first_zero, require_stable
-from armlock.engine.polynomials import Polynomial, enclosed_roots, exact, on_axis
+from armlock.engine.polynomials import (
+    Polynomial,
+    enclosed_roots,
+    exact,
+    of_roots,
+    on_axis,
+    polynomial,
+)
 from armlock.loops import checked_loop
 from armlock.robustness.many import many
 from armlock.stability.counts import decided
@@ -151,7 +157,7 @@ def varying_radius(
     varying: 1.321e-06, constant: 1.464e-06
     """
     given = checked_loop(loop, _PLACE).given(values, numbers)
-    affine, point = Affine.of(loop), [real_number(k, v) for k, v in given.items()]
+    affine, point = loop.affine, [real_number(k, v) for k, v in given.items()]
     n, m = affine.quotient(*point)
     d, changes = n + m, affine.terms[1:]
     with decided("no radius", np.array(point)):
@@ -216,9 +222,9 @@ def spectral_factor(parts: Sequence[fmpq_poly], weights: Sequence[fmpq]) -> Poly
         roots += ([complex(s.real)] if x.imag == 0 else [s, s.conjugate()]) * order
     lead = _fraction(flint.arb(whole.leading_coefficient()).sqrt())
     for more in _ENLARGED:
-        f = Polynomial.of_roots(roots) * Polynomial.of([lead * (1 + exact(more))])
-        if _is_positive(on_axis(f.exact, f.exact) - whole):
-            return f * Polynomial.of(common)
+        f = of_roots(roots) * (lead * (1 + exact(more)))
+        if _is_positive(on_axis(f, f) - whole):
+            return Polynomial.of(f * polynomial(common))
     raise UndecidedError("rounding does not decide the sum of the squares of what varies")
 
 

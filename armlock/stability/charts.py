@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 from flint import fmpq
 
-from armlock.affine import Affine, NotAffineError
 from armlock.checks import BoolArray, FloatArray, IntArray, axis, check_memory, real_number
 from armlock.compiled import Progress
 from armlock.engine import chain
+from armlock.engine.affine import Affine, NotAffineError
 from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import EPSILON
@@ -180,14 +180,14 @@ def stability_chart(
     (name1, xs), (name2, ys), numbers = _axes(system, axes, axes_and_numbers)
     check_memory(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
     try:
-        affine = Affine(system, (name1, name2), **numbers)
+        affine = system.affine_in((name1, name2), **numbers)
     except NotAffineError:
         counts = _by_rows(system, {name1: xs}, {name2: ys}, numbers)
         return StabilityChart(system, xs, ys, counts, (name1, name2))
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
     if affine.terms[1].is_zero:
         # Nothing crosses along a row: walk along the columns instead.
-        affine = Affine(system, (name2, name1), **numbers)
+        affine = system.affine_in((name2, name1), **numbers)
         counts = _chart(affine, ys[order_y], xs[order_x]).T
     else:
         counts = _chart(affine, xs[order_x], ys[order_y])

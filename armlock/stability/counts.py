@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from armlock.affine import Affine, NotAffineError, present, quotient_at
 from armlock.checks import (
     BoolArray,
     FloatArray,
@@ -26,6 +25,7 @@ from armlock.checks import (
     real_number,
 )
 from armlock.engine import decide
+from armlock.engine.affine import Affine, NotAffineError, present
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
 from armlock.engine.functions import Function, check_sizes, common_zeros, stacked
@@ -232,7 +232,7 @@ def unstable_roots(
     found = np.empty(len(points), np.int64)
     for i, point in enumerate(points):
         try:
-            found[i] = count_exactly(*quotient_at(system, point.tolist()), right_of)
+            found[i] = count_exactly(*system.functions(point.tolist()), right_of)
         except UndecidedError as error:
             if len(points) == 1:
                 raise CountError(f"no count{place(point)}: {error}", points) from None
@@ -243,11 +243,11 @@ def unstable_roots(
 def _over(system: System, points: FloatArray) -> tuple[Affine, FloatArray]:
     """Return a system, affine in the parameters that vary, and the points of these."""
     with suppress(NotAffineError):
-        return Affine.of(system), points
+        return system.affine, points
     varies = (points != points[0]).any(axis=0)
     names = np.array(system.parameters)
     held = dict(zip(names[~varies].tolist(), points[0, ~varies].tolist(), strict=True))
-    return Affine(system, names[varies].tolist(), **held), points[:, varies]
+    return system.affine_in(names[varies].tolist(), **held), points[:, varies]
 
 
 def at_points(

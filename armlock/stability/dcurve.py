@@ -14,15 +14,14 @@ import numpy as np
 import numpy.typing as npt
 from flint import fmpq, fmpq_poly
 
-from armlock.affine import Affine, functions
 from armlock.checks import FloatArray, check_memory, positive_number, real_array
-from armlock.engine.chain import Lag
+from armlock.engine.affine import Affine, functions
 from armlock.engine.functions import at
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import collected, polynomial, rounded
 from armlock.stability.counts import CountError
 from armlock.stability.crossings import crossings
-from armlock.systems import Sum, System
+from armlock.systems import Lag, Sum, System
 from armlock.tables import Table, as_html, as_text, spread
 
 _S = fmpq_poly([0, 1])
@@ -89,7 +88,7 @@ class _Curve:
     """D = d + x b + y c on the axis, by Cramer's rule; the determinant is exact."""
 
     def __init__(self, system: System, x: str, y: str) -> None:
-        self.affine = affine = Affine(system, (x, y))
+        self.affine = affine = system.affine_in((x, y))
         d = system.numerator + system.denominator
         b, c = d.by_length(x), d.by_length(y)
         for name, part in ((x, b), (y, c)):
@@ -250,7 +249,7 @@ def d_curve_line(system: System, **numbers: float) -> Line:
     system, x, y = _two(system, numbers)
     # Of the roots at s = 0 that are left out the next coefficient decides.
     order = system.cancelled() if system.at_zero is None else system.at_zero
-    terms = Affine(system, (x, y)).terms
+    terms = system.affine_in((x, y)).terms
     value, first, second = (f.series(order + 1)[order] for f in terms)
     scale = max(first, second, key=abs)
     if not scale:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.affine import open_quotient
 from armlock.checks import BoolArray, ComplexArray, FloatArray, positive_number
 from armlock.engine import decide
 from armlock.engine.functions import (
@@ -286,7 +285,7 @@ def nyquist(
     >>> curve.encirclements, curve.open_loop_poles, curve.closed_loop_roots
     (1, 0, 1)
     """
-    n, m, point = open_quotient(loop, values, numbers)
+    n, m, point = System.of(loop, "loop").open_functions(values, numbers)
     poles = open_loop_poles(m)
     order, radius = _leading_radius(n, m)
     with decided("no Nyquist count", point):
@@ -367,7 +366,7 @@ def axis_crossings(
     5.63e-05 rad/s: -5.13
     1.96e-04 rad/s: -113.07
     """
-    n, m, point = open_quotient(loop, values, numbers)
+    n, m, point = System.of(loop, "loop").open_functions(values, numbers)
     least = 0.0
     if omega_max is None:
         least = _SMALL

@@ -18,7 +18,6 @@ import numpy as np
 import numpy.typing as npt
 from flint import acb, acb_poly, arb, fmpq, fmpq_poly
 
-from armlock.affine import quotient_at
 from armlock.checks import ComplexArray, FloatArray, real_number
 from armlock.engine import chain, decide, inclusion
 from armlock.engine.chain import UndecidedError
@@ -697,7 +696,7 @@ def characteristic_roots(
     system, points, shape = at_points(system, values, numbers)
     if shape:
         raise ValueError(f"parameters must be numbers, got arrays of the shape {shape}")
-    n, m = quotient_at(system, points[0].tolist())
+    n, m = system.functions(points[0].tolist())
     discs = _all_right_of(n, m, sigma, points[0])
     found = [(s, float(disc.radius)) for disc in discs for s in disc.roots]
     found.sort(key=lambda pair: (-pair[0].real, abs(pair[0].imag), -pair[0].imag))
@@ -805,6 +804,6 @@ def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayL
     system, points, shape = at_points(system, values, numbers)
     found = []
     for point in points.tolist():
-        n, m = quotient_at(system, point)
+        n, m = system.functions(point)
         found.append(rightmost_zero(n + m, common_zeros(n, m)))
     return np.array(found, np.complex128).reshape(shape) if shape else found[0]

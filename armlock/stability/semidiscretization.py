@@ -25,11 +25,10 @@ from armlock.checks import (
     whole_number,
     whole_steps,
 )
-from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.polynomials import collected, exact
 from armlock.stability.counts import at_points
 from armlock.stability.roots import rightmost_root
-from armlock.systems import Sum, System
+from armlock.systems import NOW, Delay, Lag, Sum, System
 
 # Bits of a map's coefficients.
 _BITS = 400

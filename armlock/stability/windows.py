@@ -16,10 +16,9 @@ import numpy as np
 from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_mpoly_ctx, fmpq_poly
 
 from armlock.checks import positive_number
-from armlock.engine.chain import Delay, Lag
 from armlock.engine.polynomials import collected, enclosed_roots, exact
 from armlock.stability.counts import UNCONFINED, CountError, unstable_roots
-from armlock.systems import Sum, System, delay_object, exact_number
+from armlock.systems import Delay, Lag, Sum, System, delay_object, exact_number
 
 # Bits of frequencies, to which share exp(-s theta) is known, and most windows.
 _BITS, _TOLERANCE, _MOST_WINDOWS = 192, 2.0**-80, 10_000

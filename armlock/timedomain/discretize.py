@@ -27,8 +27,8 @@ from numpy.polynomial import polynomial as poly
 
 from armlock.checks import ComplexArray, FloatArray, positive_number, real_array
 from armlock.compiled import njit
-from armlock.controllers import Controller
 from armlock.sensors import SignalMapping
+from armlock.systems import Controller, System
 
 #: Rows of numbers, in the form that lets the compiler unroll loops over them.
 Rows = tuple[tuple[float, ...], ...]
@@ -120,7 +120,7 @@ def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     return np.asarray(2.0 * rate * np.tan(0.5 * real_array("omega", omega) / rate))
 
 
-def sampled_filter(controller: Controller, sample_rate: float) -> SampledFilter:
+def sampled_filter(controller: System, sample_rate: float) -> SampledFilter:
     r"""Apply the trapezoidal rule to zeros, poles and gain.
 
     With h half the sampling step T, each pole or zero p becomes
@@ -134,7 +134,7 @@ def sampled_filter(controller: Controller, sample_rate: float) -> SampledFilter:
 
     Parameters
     ----------
-    controller : Controller
+    controller : System
         Zeros, poles and gain, with no more zeros than poles.
     sample_rate : float
         In Hz.
@@ -154,8 +154,8 @@ def sampled_filter(controller: Controller, sample_rate: float) -> SampledFilter:
     t2 are differences and products of differences that lose no digits, however far poles and
     zeros lie apart.
     """
-    zeros: ComplexArray = np.array(controller.zeros, dtype=complex)
-    poles: ComplexArray = np.array(controller.poles, dtype=complex)
+    zeros: ComplexArray = np.array(controller.zeros(), dtype=complex)
+    poles: ComplexArray = np.array(controller.poles(), dtype=complex)
     if zeros.size > poles.size:
         raise ValueError(
             f"controller must be proper, got more zeros than poles: {zeros.size} and "
@@ -296,7 +296,7 @@ def sampled_sensor(
 
 
 def sampled_loop(
-    controller: Controller, mapping: SignalMapping, sample_rate: float
+    controller: System, mapping: SignalMapping, sample_rate: float
 ) -> tuple[SampledSensor, SampledFilter]:
     """Return sensor and controller in samples, one behind the other.
 
@@ -306,7 +306,7 @@ def sampled_loop(
 
     Parameters
     ----------
-    controller : Controller
+    controller : System
         Controller and actuator.
     mapping : SignalMapping
         The sensor; its product with the controller is proper.
@@ -317,7 +317,7 @@ def sampled_loop(
     -------
     tuple of SampledSensor and SampledFilter
     """
-    zeros, poles = list(controller.zeros), list(controller.poles)
+    zeros, poles = list(controller.zeros()), list(controller.poles())
     numerators = [np.array(n) for n in (mapping.numerator1, mapping.numerator2)]
     denominator = np.array(mapping.denominator)
     while (0.0 in zeros or not any(n[0] for n in numerators)) and (

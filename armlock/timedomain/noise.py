@@ -22,7 +22,7 @@ from armlock.checks import (
     whole_number,
 )
 from armlock.compiled import njit
-from armlock.controllers import Controller
+from armlock.systems import Controller
 from armlock.tables import Shown, Table, number
 from armlock.timedomain.discretize import (
     Rows,
@@ -102,7 +102,7 @@ class ShapedNoise(Shown):
     ) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self._filter = Controller(zeros, poles, gain)
-        for pole in self._filter.poles:
+        for pole in self._filter.poles():
             if pole.real >= 0.0:
                 raise ValueError(f"poles must lie in the left half-plane, got {pole} rad/s")
         self._random = np.random.default_rng(whole_number("seed", seed, 0))
@@ -113,8 +113,8 @@ class ShapedNoise(Shown):
         self._root = stationary_root(self._sampled)
         if not np.isfinite(self._root).all():
             raise ValueError(
-                f"noise must have a finite r.m.s., got poles {self._filter.poles} in rad/s at "
-                f"a sample_rate of {self.sample_rate} Hz"
+                f"noise must have a finite r.m.s., got poles {tuple(map(complex, poles))} in "
+                f"rad/s at a sample_rate of {self.sample_rate} Hz"
             )
         if not self._at_rest:
             order = self._sampled.order

@@ -19,16 +19,14 @@ import numpy as np
 import numpy.typing as npt
 from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpq_poly
 
-from armlock.affine import Affine, open_quotient
 from armlock.checks import ComplexArray, FloatArray, finite_series, positive_number
-from armlock.engine.chain import Delay, Lag
 from armlock.engine.decide import count
 from armlock.engine.functions import common_zeros
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.margins import require_stable
 from armlock.engine.polynomials import collected, enclosed_roots, exact, polynomial
 from armlock.stability.counts import decided
-from armlock.systems import Sum, System
+from armlock.systems import Delay, Lag, Sum, System
 from armlock.systems import s as laplace
 from armlock.timedomain.inversion import Line, TooLongError, inverted
 
@@ -195,10 +193,11 @@ def step_info(system: System, timepts: npt.ArrayLike, **options: Any) -> dict[st
     """
     import control
 
-    n, d, point = open_quotient(system, (), {}, "system")
+    system = System.of(system)
+    n, d, point = system.open_functions((), {}, "system")
     with decided("no final value", point):
         require_stable(d, common_zeros(n, d), "system", "pole")
-    final = float(np.real(System.of(system)(0.0)))
+    final = float(np.real(system(0.0)))
     if not final:
         raise ValueError(
             f"system must have a final value that is not zero, got {system!r:.200}"
@@ -351,7 +350,7 @@ class _Truncated:
         #: One over the shortest delay.
         delays = [float(theta) for part in (self.n, self.m) for theta in part if theta]
         self.soonest = 1.0 / min(delays, default=np.inf)
-        self.below = Affine(System(_sum(self.m), Sum({}))).n[0]
+        self.below = System(_sum(self.m), Sum({})).affine.n[0]
         self.low, self.high = 0.0, np.inf
 
     def until(self, last: float) -> _Until:
@@ -364,7 +363,7 @@ class _Truncated:
             # Without impulses the response is as large as s times its transform at any real s.
             s = np.geomspace(sigma, 100.0 * max(corner, self.soonest), 50).astype(complex)
             impulses = _parts(above, under, corner, s)[0]
-            size = float(np.abs(s * (self.system.quotient(s, {})[0] - impulses)).max())
+            size = float(np.abs(s * (self.system(s) - impulses)).max())
             # Parts that are far larger than the response would cancel against the rest.
             heights = [abs(a) / corner ** (k - 1) for k in (2, 3) for a in jumps[k].values()]
             if corner >= self.soonest or max(heights, default=0.0) <= _MOST_ABOVE * size:
@@ -493,7 +492,7 @@ def _smooth(
     system: System, n: list[_Jumps], m: list[_Jumps], corner: float, s: ComplexArray
 ) -> tuple[ComplexArray, FloatArray]:
     """Evaluate what remains of G(s) without these parts, and bound its rounding errors."""
-    parts, (value, error) = _parts(n, m, corner, s), system.quotient(s, {})
+    parts, (value, error) = _parts(n, m, corner, s), system.values(s, ())
     rest = value - sum(parts)
     # Delays turn by the same rounded products s theta in G and in its parts.
     turned = 1.0 + np.abs(s) * system.longest_delay

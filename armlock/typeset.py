@@ -1,0 +1,60 @@
+"""Sums of polynomials, delays and parameters as one writes them, in plain text and in TeX."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from typing import TYPE_CHECKING
+
+from flint import fmpq, fmpq_poly
+
+if TYPE_CHECKING:
+    from armlock.systems import Lag, Sum
+
+
+def written(found: Sum, latex: bool = False) -> str:
+    """Return a sum as one writes it."""
+    shown = []
+    for (lag, names), p in sorted(
+        found.terms.items(), key=lambda term: (term[0][0].time, term[0][1])
+    ):
+        factors = [*names]
+        if lag:
+            factors.append(_exponential(lag, latex))
+        power = _powers(p, latex)
+        several = sum(map(bool, p.coeffs())) > 1 and (factors or len(found.terms) > 1)
+        if factors and power in ("1", "-1"):
+            shown.append(power[:-1] + " ".join(factors))
+        else:
+            shown.append(" ".join([f"({power})" if several else power, *factors]))
+    return " + ".join(shown).replace("+ -", "- ") or "0"
+
+
+def number(value: fmpq) -> str:
+    """Return a fraction, which may be no float, with six digits."""
+    try:
+        if value == 0 or abs(float(value)) > 1e-300:
+            return f"{float(value):.6g}"
+    except OverflowError:
+        pass
+    return f"{Decimal(int(value.p)) / int(value.q):.5e}"
+
+
+def _exponential(lag: Lag, latex: bool) -> str:
+    """Return exp(-s theta) as text."""
+    exponent = f"-{number(lag.time)} s"
+    return f"e^{{{exponent}}}" if latex else f"exp({exponent})"
+
+
+def _powers(p: fmpq_poly, latex: bool) -> str:
+    """Return a polynomial as text, in descending powers."""
+    shown = []
+    for k, c in reversed(list(enumerate(p.coeffs()))):
+        if c:
+            digits, power = number(c), ("", "s", f"s^{{{k}}}" if latex else f"s^{k}")
+            symbol = power[min(k, 2)]
+            if symbol and digits in ("1", "-1"):
+                digits = digits[:-1]
+            if latex and "e" in digits:
+                digits = digits.replace("e", r" \cdot 10^{") + "}"
+            shown.append(f"{digits} {symbol}".strip() if digits != "-" else f"-{symbol}")
+    return " + ".join(shown).replace("+ -", "- ")
