@@ -415,6 +415,14 @@ def test_hundreds_of_roots_of_a_flight_loop_are_all_listed():
     np.testing.assert_array_equal(fewer.values, found.values[: len(fewer)])
 
 
+def test_thousands_of_roots_are_listed_in_seconds():
+    begun, tau = time.process_time(), 6e3
+    found = characteristic_roots(HayesEquation(tau), 0.0, -4.0, right_of=-1e-6)
+    assert time.process_time() - begun < 20.0
+    expected = independent.hayes_roots(0.0, -4.0, tau, branches=4000)
+    assert len(found) == (expected.real > -1e-6).sum() == 7686
+
+
 @pytest.mark.parametrize("number", [2, 3, 5])
 def test_a_multiple_root_stands_in_the_list_as_often_as_it_is_one(number):
     multiple = (s + 1) ** number * (s + 2 + 0.1 * delay(1.0))

@@ -317,7 +317,7 @@ class _Search:
             length = np.abs(move)
         return s - move, np.where(np.isnan(length), np.inf, length)
 
-    def candidates(self, sigma: float) -> ComplexArray:
+    def candidates(self, sigma: float, most: int = _MOST_STARTS) -> ComplexArray:
         """Return where Newton's method leads from a line, the rightmost first."""
         line = self._line(sigma)
         end = line.end
@@ -337,7 +337,7 @@ class _Search:
         wider = np.pad(length, 1, constant_values=np.inf)
         here = (length <= wider[:-2]) & (length < wider[2:])
         s = (s - move)[here]
-        s = s[np.argsort(-s.real, kind="stable")][:_MOST_STARTS]
+        s = s[np.argsort(-s.real, kind="stable")][:most]
         # Next to lightly damped poles rounding may hide D; its roots there lie next to them.
         s = np.append(s, self.poles + 1e-3j * _SLOWEST * line.turn)
         return self._led(s, line.turn)
@@ -389,27 +389,29 @@ class _Search:
 
     def right_of(self, sigma: float, number: int) -> list[_Disc]:
         """Return discs of all roots right of a line, of which there are so many, or of some."""
-        found: list[_Disc] = []
-
-        def missing() -> int:
-            return number - sum(disc.size for disc in found)
+        found, places, missing = list[_Disc](), np.zeros(0, np.complex128), number
 
         def keep(starts: ComplexArray, numbers: Iterable[int]) -> bool:
             """Enclose what is new, and tell whether something was."""
-            before, numbers = missing(), list(numbers)
+            nonlocal places, missing
+            before, numbers = missing, list(numbers)
             for start in starts.tolist():
                 there = complex(start.real, abs(start.imag))
-                if any(abs(there - disc.root) <= _SAME * abs(there) for disc in found):
+                if not missing or (np.abs(places - there) <= _SAME * abs(there)).any():
                     continue
-                disc = self.balls.enclosed(there, numbers) if missing() > 0 else None
-                inside = disc and disc.centre.real - disc.radius > sigma
-                if disc and inside and not any(disc.meets(other) for other in found):
+                disc = self.balls.enclosed(there, numbers)
+                if disc is None or not disc.centre.real - disc.radius > sigma:
+                    continue
+                # Discs are far smaller than this.
+                close = np.flatnonzero(np.abs(places - disc.root) <= 0.1 * abs(disc.root))
+                if not any(disc.meets(found[k]) for k in close):
                     found.append(disc)
-            return missing() < before
+                    places, missing = np.append(places, disc.root), missing - disc.size
+            return missing < before
 
         turns, line = np.exp(2j * np.pi * (np.arange(6) + 0.3) / 6.0), sigma
         for k in range(_LINES):
-            candidates = self.candidates(line)
+            candidates = self.candidates(line, max(2 * number, _MOST_STARTS))
             keep(candidates, [1])
             for _ in range(_ROUNDS):
                 # Newton's method for F over the factors of what is known leads elsewhere.
@@ -418,11 +420,11 @@ class _Search:
                 starts = starts[np.argsort(np.abs(starts - line))][: _MOST_STARTS // 6]
                 around = 0.3 * np.abs(starts) + 1e-9 * self.unit
                 starts = (starts[:, None] + around[:, None] * turns).ravel()
-                if missing() <= 0 or not keep(self._led(starts, self.unit, known), [1]):
+                if missing <= 0 or not keep(self._led(starts, self.unit, known), [1]):
                     break
-            if missing() > 0:
-                keep(candidates, range(2, 1 + min(missing(), _MOST_IN_A_DISC)))
-            if missing() <= 0:
+            if missing > 0:
+                keep(candidates, range(2, 1 + min(missing, _MOST_IN_A_DISC)))
+            if missing <= 0 or self.steps > _ALL_STEPS:
                 break
             self.further = min(2.0 * self.further, _MOST_TURNS_FURTHER)
             line = sigma + 0.25 * self.unit * (2.0**k)
