@@ -22,7 +22,7 @@ from scipy import ndimage
 from armlock.checks import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from armlock.engine.margins import Margins
+    from armlock.robustness.margins import Margins
     from armlock.stability.charts import StabilityChart
     from armlock.stability.dcurve import Branch, Line
     from armlock.stability.nyquist import NyquistCurve

@@ -38,9 +38,9 @@ from armlock import (
 from armlock.engine import chain, polynomials
 from armlock.engine.decide import count
 from armlock.engine.functions import common_zeros
-from armlock.engine.margins import gain_limits
 from armlock.engine.polynomials import Polynomial, of_roots
 from armlock.robustness import perturbations
+from armlock.robustness.margins import gain_limits
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.systems import Delay, Lag
 from tests import independent

@@ -26,7 +26,7 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.engine.margins import chain_limit
+from armlock.robustness.margins import chain_limit
 from armlock.sensors import DIFFERENCE
 from armlock.stability import crossings
 from armlock.stability.counts import count_points

@@ -4,9 +4,8 @@ Each margin comes from a certified search of the axis and is confirmed by counts
 cannot be certified is refused.
 """
 
-from armlock.engine.margins import Margins
 from armlock.robustness.many import Many
-from armlock.robustness.margins import PeakGain, margins, modulus_margin, peak_gain
+from armlock.robustness.margins import Margins, PeakGain, margins, modulus_margin, peak_gain
 from armlock.robustness.perturbations import (
     Crossing,
     box_count,

@@ -20,10 +20,10 @@ from armlock.engine.affine import Affine, NotAffineError
 from armlock.engine.decide import BOUNDARY, UNCONFINED, Family
 from armlock.engine.functions import Function, common_zeros
 from armlock.engine.inclusion import EPSILON, TERM, VERTEX
-from armlock.engine.margins import first_zero
 from armlock.engine.polynomials import collected, exact, polynomial, rounded
 from armlock.loops import Loop, checked_loop
 from armlock.robustness.many import many
+from armlock.robustness.margins import first_zero
 from armlock.stability.counts import CountError, decided, unstable_roots
 from armlock.systems import NOW, Delay, Lag, Sum, System, delay_object
 from armlock.tables import Table, as_html, as_text, at, number

@@ -23,7 +23,6 @@ from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import Family
 from armlock.engine.functions import Function, Space, at, common_zeros, stacked
 from armlock.engine.inclusion import VERTEX
-from armlock.engine.margins import decided_ratio, first_zero, require_stable
 from armlock.engine.polynomials import (
     Polynomial,
     enclosed_roots,
@@ -34,6 +33,7 @@ from armlock.engine.polynomials import (
 )
 from armlock.loops import checked_loop
 from armlock.robustness.many import many
+from armlock.robustness.margins import decided_ratio, first_zero, require_stable
 from armlock.stability.counts import decided
 from armlock.tables import Table, as_html, as_text, number
 from armlock.tables import at as where

@@ -23,8 +23,8 @@ from armlock.checks import ComplexArray, FloatArray, finite_series, positive_num
 from armlock.engine.decide import count
 from armlock.engine.functions import common_zeros
 from armlock.engine.inclusion import EPSILON
-from armlock.engine.margins import require_stable
 from armlock.engine.polynomials import collected, enclosed_roots, exact, polynomial
+from armlock.robustness.margins import require_stable
 from armlock.stability.counts import decided
 from armlock.systems import Delay, Lag, Sum, System
 from armlock.systems import s as laplace
