@@ -203,6 +203,13 @@ def test_hidden_modes_and_terms_that_cancel_are_no_part_of_a_response():
     assert step_response(biproper, [8.3]).outputs == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.parametrize("size", [1e-40, 1e-14, 1e14, 1e40])
+def test_a_response_does_not_depend_on_the_size_of_the_denominator(size):
+    system = delay(1.0) / (size * (s + 1))
+    found = impulse_response(system, [1.0, 1.5, 3.0]).outputs
+    assert found == pytest.approx(np.exp([-0.0, -0.5, -2.0]) / size, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("system", "last", "why"),
     [

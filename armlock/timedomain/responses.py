@@ -432,9 +432,9 @@ def _expansion(n: list[_Jumps], m: list[_Jumps], last: float) -> list[_Jumps]:
 def _quotient(left: _Jumps, by: _Jumps, last: float) -> _Jumps:
     """Divide one sum of delays by another, whose shortest delay is zero, up to a time."""
     queue, found = list(left), {}
-    smallest = 1e-14 * max(map(abs, left.values()), default=0.0)
-    heapify(queue)
     zero, end = fmpq(0), exact(last)
+    smallest = 1e-14 * max(map(abs, left.values()), default=0.0) / abs(by[zero])
+    heapify(queue)
     while queue:
         theta = heappop(queue)
         value = left.pop(theta, 0.0) / by[zero]
