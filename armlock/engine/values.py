@@ -185,7 +185,7 @@ class _Sum:
                 here, largest = still if far else steady, abs(still if far else steady)
                 for k, weight in late:
                     if k not in turns:
-                        turn = _turn(s, self.delays[k], self.tails[k], far)
+                        turn = turned(s, self.delays[k], self.tails[k], far)
                         turns[k] = turn, np.abs(turn)
                     here = here + weight * turns[k][0]
                     largest = largest + abs(weight) * turns[k][1]
@@ -196,7 +196,7 @@ class _Sum:
         return value, size / np.abs(value)
 
 
-def _turn(s: ComplexArray, theta: float, tail: float, far: bool) -> ComplexArray:
+def turned(s: ComplexArray, theta: float, tail: float, far: bool) -> ComplexArray:
     """Return exp(-s theta), less one unless far, with the digits that s * theta is short of.
 
     Many turns of a delay are rounded by more than the exponential is: Dekker's product.

@@ -24,6 +24,7 @@ from armlock.engine.decide import count
 from armlock.engine.functions import common_zeros
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import collected, enclosed_roots, exact, polynomial
+from armlock.engine.values import turned
 from armlock.robustness.margins import require_stable
 from armlock.stability.counts import decided
 from armlock.systems import Delay, Lag, Sum, System
@@ -472,7 +473,10 @@ def _parts(
     n: list[_Jumps], m: list[_Jumps], corner: float, s: ComplexArray
 ) -> list[ComplexArray]:
     """Evaluate impulses, jumps and kinks: the powers of 1 / (s + corner) of N / M."""
-    turns = {theta: np.exp(-s * float(theta)) for theta in set().union(*n, *m)}
+    turns = {
+        theta: turned(s, float(theta), float(theta - exact(float(theta))), far=True)
+        for theta in set().union(*n, *m)
+    }
 
     def at(part: _Jumps) -> ComplexArray:
         total = np.zeros_like(s)
@@ -494,9 +498,8 @@ def _smooth(
     """Evaluate what remains of G(s) without these parts, and bound its rounding errors."""
     parts, (value, error) = _parts(n, m, corner, s), system.values(s, ())
     rest = value - sum(parts)
-    # Delays turn by the same rounded products s theta in G and in its parts.
-    turned = 1.0 + np.abs(s) * system.longest_delay
-    error = error + EPSILON * (8.0 * sum(map(np.abs, parts)) + turned * np.abs(rest))
+    # Delays turn alike in G and in its parts.
+    error = error + 8.0 * EPSILON * sum(map(np.abs, parts))
     return rest, np.asarray(error)
 
 
