@@ -50,11 +50,13 @@ class Quotient:
         # Weights over the largest of M: those of many fast poles would overflow.
         sizes = [abs(x) for f in m for x in (*f.steady, *f.delayed.ravel())]
         scale = max(sizes, default=fmpq(0)) or fmpq(1)
+        space = (n or m)[0].space
+        self.delays, self.tails = space.arrays.delays[:, None], space.arrays.tails[:, None]
         self.above, self.below = _Sum(n, scale), _Sum(m, scale) if m else None
         over = self.below.common if self.below else Counter()
         # Factors that N and M share are left out.
         zeros, poles = self.above.common - over, over - self.above.common
-        self.factors = _Factors(zeros, poles, (n or m)[0].space)
+        self.factors = _Factors(zeros, poles, space)
 
     def at(
         self,
@@ -82,7 +84,7 @@ class Quotient:
         """
         found, errors = np.empty(s.shape, np.complex128), np.empty(s.shape)
         # Far on the right exponentials vanish beside one.
-        far = s.real * self.above.shortest > 1.0
+        far = s.real * self.delays[:1].sum() > 1.0
         for part in (far, ~far) if far.any() and not far.all() else (np.ones_like(far),):
             places = np.flatnonzero(part)
             for first in range(0, places.size, _BLOCK):
@@ -101,12 +103,13 @@ class Quotient:
         self, s: ComplexArray, numbers: Sequence[Any], far: bool
     ) -> tuple[ComplexArray, FloatArray]:
         """Return some values, and their errors: nan where balls are needed."""
-        turns: dict[int, Any] = {}
-        top, off = self.above.at(s, numbers, turns, far)
+        turns = turned(s, self.delays, self.tails, far)
+        sizes = np.abs(turns)
+        top, off = self.above.at(s, numbers, turns, sizes, far)
         front, more = self.factors.at(s)
         value, off = front * top, off + more
         if self.below:
-            bottom, more = self.below.at(s, numbers, turns, far)
+            bottom, more = self.below.at(s, numbers, turns, sizes, far)
             value, off = value / bottom, off + more
         return value, np.where(off <= _MAY_LOSE, _ROUNDING * off * np.abs(value), np.nan)
 
@@ -147,8 +150,6 @@ class _Sum:
 
     def __init__(self, functions: Sequence[Function], scale: fmpq) -> None:
         space = functions[0].space
-        self.delays, self.tails = space.arrays.delays, space.arrays.tails
-        self.shortest = float(self.delays[:1].sum())
         acting = [
             [(f.steady[j] / scale, f.delayed[j] / scale) for f in functions]
             for j in range(len(space.polynomials))
@@ -172,7 +173,12 @@ class _Sum:
         ]  # fmt: skip
 
     def at(
-        self, s: ComplexArray, numbers: Sequence[Any], turns: dict[int, Any], far: bool
+        self,
+        s: ComplexArray,
+        numbers: Sequence[Any],
+        turns: ComplexArray,
+        sizes: FloatArray,
+        far: bool,
     ) -> tuple[Any, Any]:
         """Return the sum without its common factors, and the size of its terms over it."""
         value, size = 0.0, 0.0
@@ -184,11 +190,8 @@ class _Sum:
                     continue
                 here, largest = still if far else steady, abs(still if far else steady)
                 for k, weight in late:
-                    if k not in turns:
-                        turn = turned(s, self.delays[k], self.tails[k], far)
-                        turns[k] = turn, np.abs(turn)
-                    here = here + weight * turns[k][0]
-                    largest = largest + abs(weight) * turns[k][1]
+                    here = here + weight * turns[k]
+                    largest = largest + abs(weight) * sizes[k]
                 total, most = total + x * here, most + np.abs(x) * largest
             p, off = factors.at(s)
             p = lead * p
@@ -196,7 +199,7 @@ class _Sum:
         return value, size / np.abs(value)
 
 
-def turned(s: ComplexArray, theta: float, tail: float, far: bool) -> ComplexArray:
+def turned(s: ComplexArray, theta: Any, tail: Any, far: bool) -> ComplexArray:
     """Return exp(-s theta), less one unless far, with the digits that s * theta is short of.
 
     Many turns of a delay are rounded by more than the exponential is: Dekker's product.
@@ -207,7 +210,7 @@ def turned(s: ComplexArray, theta: float, tail: float, far: bool) -> ComplexArra
     low, s_low = theta - high, s - s_high
     rest = ((high * s_high - product) + high * s_low + low * s_high) + low * s_low
     rest += tail * s
-    turn = np.exp(-product) if far else np.expm1(-product)
+    turn: ComplexArray = np.exp(-product) if far else np.expm1(-product)
     turn -= rest * (turn if far else 1.0 + turn)
     return turn
 
