@@ -1,7 +1,8 @@
 """How results are drawn: the book's style, charts, D-curves and Nyquist curves.
 
 Results draw themselves, as `chart.plot()` does, by the functions here, and import this module
-when they are first drawn. python-control draws `loop.frequency_response(omega)`.
+when they are first drawn: a result is Any here, so that nothing is imported in a circle.
+python-control draws `loop.frequency_response(omega)`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -20,13 +21,6 @@ from matplotlib.projections.polar import PolarAxes
 from scipy import ndimage
 
 from armlock.checks import ComplexArray, FloatArray
-
-if TYPE_CHECKING:
-    from armlock.robustness.margins import Margins
-    from armlock.stability.charts import StabilityChart
-    from armlock.stability.dcurve import Branch, Line
-    from armlock.stability.nyquist import NyquistCurve
-    from armlock.stability.roots import CharacteristicRoots
 
 #: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito). The colour
 #: cycle of armlock.mplstyle has the same.
@@ -50,7 +44,7 @@ def use_style() -> None:
 
 
 def plot_chart(
-    chart: StabilityChart,
+    chart: Any,
     ax: Axes | None = None,
     *,
     counts: bool = True,
@@ -122,7 +116,7 @@ def _edges(name: str, axis: FloatArray) -> FloatArray:
     return np.concatenate(([2.0 * axis[0] - inner[0]], inner, [2.0 * axis[-1] - inner[-1]]))
 
 
-def _label_regions(ax: Axes, chart: StabilityChart) -> None:
+def _label_regions(ax: Axes, chart: Any) -> None:
     """Write the count into each region, at its point that is farthest from the edges."""
     room = _ROOM * min(chart.counts.shape)
     for count in np.unique(chart.counts[chart.counts >= 0]):
@@ -152,7 +146,7 @@ def _written(name: str) -> str:
     return f"${letter}_{{{digits}}}$" if digits else f"${letter}$"
 
 
-def plot_branches(branches: Sequence[Branch], ax: Axes | None = None, **style: Any) -> Axes:
+def plot_branches(branches: Sequence[Any], ax: Axes | None = None, **style: Any) -> Axes:
     """Draw the branches of a D-curve, as `d_curve_branches` returns them, none joined.
 
     The style is that of `matplotlib.axes.Axes.plot`; a legend names the first branch.
@@ -165,7 +159,7 @@ def plot_branches(branches: Sequence[Branch], ax: Axes | None = None, **style: A
     return ax
 
 
-def plot_line(line: Line, ax: Axes | None = None, **style: Any) -> Axes:
+def plot_line(line: Any, ax: Axes | None = None, **style: Any) -> Axes:
     """Draw the line of omega = 0, from `d_curve_line`, across the axes and their limits.
 
     The style is that of `matplotlib.axes.Axes.axline`.
@@ -181,7 +175,7 @@ def plot_line(line: Line, ax: Axes | None = None, **style: Any) -> Axes:
 # Roots --------------------------------------------------------------------------------------
 
 
-def plot_roots(roots: CharacteristicRoots, ax: Axes | None = None, **style: Any) -> Axes:
+def plot_roots(roots: Any, ax: Axes | None = None, **style: Any) -> Axes:
     """Draw characteristic roots, their line, and the region right of it.
 
     The region is shaded: it holds no other roots. The style is that of
@@ -206,11 +200,11 @@ def plot_roots(roots: CharacteristicRoots, ax: Axes | None = None, **style: Any)
 
 
 def plot_nyquist(
-    curve: NyquistCurve,
+    curve: Any,
     ax: Axes | None = None,
     *,
     arrows: Iterable[float] = (),
-    margins: Margins | None = None,
+    margins: Any = None,
     **style: Any,
 ) -> Axes:
     """Draw a Nyquist curve, both signs of omega, with -1 and the infinite branch.
@@ -294,7 +288,7 @@ def _arrow(ax: Axes, values: ComplexArray, color: str) -> None:
     ax.annotate("", stop, start, arrowprops=arrow)
 
 
-def _mark(ax: Axes, curve: NyquistCurve, margins: Margins) -> None:
+def _mark(ax: Axes, curve: Any, margins: Any) -> None:
     """Mark where a loop's margins are taken."""
     circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 400))
     ax.plot(*_coordinates(ax, circle), color="0.6", linewidth=0.8, linestyle=":")
@@ -310,7 +304,7 @@ def _mark(ax: Axes, curve: NyquistCurve, margins: Margins) -> None:
     ax.legend(fontsize=10)
 
 
-def _infinite_branch(ax: Axes, curve: NyquistCurve) -> None:
+def _infinite_branch(ax: Axes, curve: Any) -> None:
     """Draw the image of the indentation around s = 0, if there is one, at infinity."""
     half = INFINITY * curve.indentation_response / np.abs(curve.indentation_response)
     label = r"infinite branch, $\omega = 0$"

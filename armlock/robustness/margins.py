@@ -29,7 +29,7 @@ from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL, TERM
 from armlock.engine.polynomials import Polynomial, exact, on_axis, rounded
 from armlock.loops import checked_loop
 from armlock.robustness.many import many
-from armlock.stability.counts import decided
+from armlock.stability.counts import UnstableError, decided, require_stable
 from armlock.systems import Lag, Sum, System, delay_object
 from armlock.tables import Shown, Table, as_html, as_text, at, decibels, number
 
@@ -825,22 +825,3 @@ def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
         gain_lower_is_bound=below.is_bound,
         gain_upper_is_bound=above.is_bound,
     )
-
-
-class UnstableError(ValueError):
-    """A loop has to be stable, and is not."""
-
-
-def require_stable(
-    d: Function, common: int = 0, what: str = "loop", zero: str = "root"
-) -> None:
-    """Raise unless D has no zero with a real part of zero or more, but `common` at s = 0."""
-    count = decide.count(d, common)
-    if count != 0:
-        reasons = {
-            decide.BOUNDARY: f"a {zero} on the imaginary axis",
-            decide.UNCONFINED: "no confined chain: small delay changes may make it unstable",
-            1: f"1 unstable {zero}",
-        }
-        found = reasons.get(count, f"{count} unstable {zero}s")
-        raise UnstableError(f"{what} must be stable, but it has {found}")

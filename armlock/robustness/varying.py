@@ -33,8 +33,8 @@ from armlock.engine.polynomials import (
 )
 from armlock.loops import checked_loop
 from armlock.robustness.many import many
-from armlock.robustness.margins import decided_ratio, first_zero, require_stable
-from armlock.stability.counts import decided
+from armlock.robustness.margins import decided_ratio, first_zero
+from armlock.stability.counts import decided, require_stable
 from armlock.tables import Table, as_html, as_text, number
 from armlock.tables import at as where
 

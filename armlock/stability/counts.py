@@ -260,3 +260,22 @@ def at_points(
     check_memory(" and ".join(given) or "values", shape, 64)
     columns = [np.broadcast_to(x, shape).ravel() for x in given.values()]
     return system, np.column_stack(columns or [np.empty((1, 0))]), shape
+
+
+class UnstableError(ValueError):
+    """A loop has to be stable, and is not."""
+
+
+def require_stable(
+    d: Function, common: int = 0, what: str = "loop", zero: str = "root"
+) -> None:
+    """Raise unless D has no zero with a real part of zero or more, but `common` at s = 0."""
+    count = decide.count(d, common)
+    if count != 0:
+        reasons = {
+            decide.BOUNDARY: f"a {zero} on the imaginary axis",
+            decide.UNCONFINED: "no confined chain: small delay changes may make it unstable",
+            1: f"1 unstable {zero}",
+        }
+        found = reasons.get(count, f"{count} unstable {zero}s")
+        raise UnstableError(f"{what} must be stable, but it has {found}")

@@ -25,8 +25,7 @@ from armlock.engine.functions import common_zeros
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import collected, enclosed_roots, exact, polynomial
 from armlock.engine.values import turned
-from armlock.robustness.margins import require_stable
-from armlock.stability.counts import decided
+from armlock.stability.counts import decided, require_stable
 from armlock.systems import Delay, Lag, Sum, System
 from armlock.systems import s as laplace
 from armlock.timedomain.inversion import Line, TooLongError, inverted
