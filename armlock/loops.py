@@ -98,9 +98,9 @@ class Loop(System):
     Raises
     ------
     TypeError, ValueError
-        If tau1 or tau2 is not a positive finite number, `delay` is negative, a polynomial is
-        not finite and real, the open loop has more zeros than poles, or 1 + L vanishes at high
-        frequency.
+        If tau1 or tau2 is not a positive finite number, `delay` is negative, the controller is
+        zero or holds a delay or a parameter, K m1 or K m2 has more zeros than poles, or 1 + L
+        vanishes at high frequency.
 
     Attributes
     ----------
@@ -241,9 +241,10 @@ class Loop(System):
 
     @cached_property
     def paths(self) -> dict[str, System]:
-        """From what adds to the signal of an arm, of both or of their difference, to K.
+        """The paths from the signals of the arms to the laser, with the loop open.
 
-        K m1 exp(-s delay) and K m2 exp(-s delay), and half of their sum and difference.
+        They are K m1 exp(-s delay) for "arm 1" and K m2 exp(-s delay) for "arm 2", half of
+        their sum for "common", and half of their difference for "differential".
         """
         first, second = self.mapping.systems
         weights = first, second, (first + second) / 2, (first - second) / 2
@@ -258,6 +259,11 @@ class Loop(System):
         ----------
         source : {"laser", "arm 1", "arm 2", "common", "differential"}
             The input.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If there is no such input.
         """
         return self._closed[one_of("source", source, tuple(self._closed))]
 
@@ -485,7 +491,7 @@ def paper_loop(
         Corner frequency p of the sensor in rad/s. The paper gives none.
     tau1, tau2 : float, optional
         Round-trip delays in s; they must differ, unless `difference` is given.
-    controller : Controller, python-control system, or (zeros, poles, gain), optional
+    controller : System, python-control system, or (zeros, poles, gain), optional
         Table II by default; `armlock.controllers` has its stages and the printed variant.
     actuator : bool, optional
         Whether the integrating actuator 1/s of Secs. II and III is in the loop. Without it,
@@ -503,7 +509,8 @@ def paper_loop(
     Raises
     ------
     TypeError, ValueError
-        If corner or a delay is not a positive finite number, or the dtau is zero.
+        If corner, tau1 or tau2 is not a positive finite number, the dtau is zero, or as `Loop`
+        does.
 
     Examples
     --------

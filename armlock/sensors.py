@@ -8,7 +8,7 @@ the rational functions m1(s) and m2(s) by which it weighs the two, so that its r
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
 
@@ -90,7 +90,7 @@ class SignalMapping:
         return System(first, below), System(second, below)
 
     def weights(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """Evaluate (m1, m2) at complex s, in rad/s; both are shaped like `s`."""
+        """Evaluate (m1, m2) at complex s in rad/s, of any shape; both are shaped like `s`."""
         first, second = self.systems
         return first(s), second(s)
 
@@ -220,8 +220,16 @@ def _modified_dual(mean: float, half: float, w0: float) -> SignalMapping:
     )
 
 
+# The signal mappings of the paper by name, made of the delays of the two arms.
+_NAMED: dict[str, Callable[[float, float], SignalMapping]] = {
+    "single": lambda tau1, tau2: SINGLE,
+    "common": lambda tau1, tau2: COMMON,
+    "difference": lambda tau1, tau2: DIFFERENCE,
+    "dual": lambda tau1, tau2: dual(paper.DUAL_SENSOR_CORNER, tau1 - tau2),
+    "modified dual": lambda tau1, tau2: modified_dual(0.5 * (tau1 + tau2), 0.5 * (tau1 - tau2)),
+}
 #: Names of the signal mappings that `Loop` takes in place of an object.
-NAMES = ("single", "common", "difference", "dual", "modified dual")
+NAMES = tuple(_NAMED)
 
 
 def named(name: str, tau1: float, tau2: float) -> SignalMapping:
@@ -250,10 +258,4 @@ def named(name: str, tau1: float, tau2: float) -> SignalMapping:
     >>> named("common", 20.1, 19.9) is COMMON
     True
     """
-    if name == "dual":
-        return dual(paper.DUAL_SENSOR_CORNER, tau1 - tau2)
-    if name == "modified dual":
-        half = 0.5 * (tau1 - tau2)
-        return modified_dual(0.5 * (tau1 + tau2), half)
-    plain = {mapping.name: mapping for mapping in (SINGLE, COMMON, DIFFERENCE)}
-    return plain[one_of("mapping", name, NAMES)]
+    return _NAMED[one_of("mapping", name, NAMES)](tau1, tau2)

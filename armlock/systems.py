@@ -52,31 +52,23 @@ if TYPE_CHECKING:
     import control
 
 _ONE, _S = fmpq_poly([1]), fmpq_poly([0, 1])
-# Arguments of the functions that take parameters by name.
+# Arguments of the functions that take values of parameters by name.
 _TAKEN = frozenset(
     [
+        "self",
         "system",
         "loop",
         "s",
+        "squeeze",
         "omega",
         "omega_max",
+        "points_per_turn",
         "free_above",
         "right_of",
         "step",
         "order",
-        "direction",
-        "start",
-        "stop",
-        "size",
-        "low",
-        "high",
-        "points_per_turn",
-        "timepts",
-        "squeeze",
-        "axes",
-        "values",
-        "numbers",
-        "self",
+        "z",
+        "longest",
     ]
 )
 # Coefficients at s = 0 that are looked at for a limit there.
@@ -139,9 +131,9 @@ class Lag(tuple[tuple[Delay, int], ...]):
         return cls(pairs)
 
     @classmethod
-    def after(cls, theta: fmpq, mark: str = "") -> Self:
-        """Return one object of a length, by default the one that all of this length share."""
-        return cls([(Delay(theta, mark), 1)] if theta else [])
+    def after(cls, theta: fmpq) -> Self:
+        """Return the one object that all products of this length may share."""
+        return cls([(Delay(theta, ""), 1)] if theta else [])
 
     def times(self, other: Lag) -> Lag:
         """Return the product of two."""
@@ -156,7 +148,7 @@ class Lag(tuple[tuple[Delay, int], ...]):
 
     @property
     def merged(self) -> Self:
-        """The one object that all products of this length share."""
+        """One object in place of this product, the same for all products of its length."""
         return self.after(self.time)
 
 
@@ -260,13 +252,14 @@ class Sum:
         return {lag: p for (lag, given), p in self.terms.items() if given == names}
 
     def over(self, power: int, early: Lag = NOW) -> Sum:
-        """Return the sum over a power of s that all terms hold, and earlier by a delay."""
+        """Divide by a power of s that all terms hold, and multiply by a product of delays.
+
+        Powers of the product are negative, so that all terms become earlier.
+        """
         divisor = _S**power
         sizes = self._sizes and {names: p // divisor for names, p in self._sizes.items()}
-        return Sum(
-            {(t.times(early), names): p // divisor for (t, names), p in self.terms.items()},
-            sizes,
-        )
+        terms = {(lag.times(early), a): p // divisor for (lag, a), p in self.terms.items()}
+        return Sum(terms, sizes)
 
     def lowest(self, number: int) -> list[Lowest]:
         """Return the lowest coefficients at s = 0, and what rounding may make of them.
@@ -707,7 +700,7 @@ class System:
         """
         return self.affine_in(self.parameters)
 
-    def affine_in(self, free: Sequence[str], **numbers: Any) -> Affine:
+    def affine_in(self, free: Sequence[str], /, **numbers: Any) -> Affine:
         """Return N and M as functions of the engine, affine in the parameters that vary.
 
         Parameters
@@ -721,6 +714,8 @@ class System:
         ------
         NotAffineError
             If two parameters that vary are multiplied, or one by itself.
+        TypeError, ValueError
+            If another parameter has no value, or one that is not finite and real.
         """
         origin = tuple(self.nominal.get(name) or 0.0 for name in free)
         given = self.given((), {**dict.fromkeys(free, 0.0), **numbers})
@@ -740,7 +735,13 @@ class System:
     def functions(
         self, values: Iterable[Any] = (), numbers: Mapping[str, Any] | None = None
     ) -> tuple[Function, Function]:
-        """Return N and M at given values of the parameters, exactly."""
+        """Return N and M at given values of the parameters, exactly.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If a parameter has no value, or one that is not finite and real.
+        """
         given = self.given(values, numbers or {})
         point = {k: exact_number(k, v) for k, v in given.items()}
         try:
@@ -751,9 +752,19 @@ class System:
     def open_functions(
         self, values: Iterable[Any], numbers: Mapping[str, Any], name: str = "loop"
     ) -> tuple[Function, Function, FloatArray]:
-        """Return N and M of an open loop L = N / M, and the point of its parameters.
+        """Return N and M of an open loop L = N / M, and the values of its parameters.
 
-        An equation D = 0 is refused: it has no open loop.
+        Parameters
+        ----------
+        values, numbers
+            Values of the parameters, by place and by name.
+        name : str, optional
+            What an error calls the system.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the system is an equation, which has no open loop, or as `functions`.
         """
         if self.is_equation:
             raise TypeError(
@@ -769,9 +780,25 @@ class System:
         above, below = self.rational("gain")
         return float(above.leading_coefficient() / below.leading_coefficient())
 
+    @property
+    def is_rational(self) -> bool:
+        """Whether it is an open loop without delays and parameters."""
+        return not (self.parameters or self.longest_delay or self.is_equation)
+
     def rational(self, name: str = "system") -> tuple[fmpq_poly, fmpq_poly]:
-        """Return numerator and denominator of a system without delays and parameters."""
-        if self.parameters or self.longest_delay or self.is_equation:
+        """Return numerator and denominator of a system without delays and parameters.
+
+        Parameters
+        ----------
+        name : str, optional
+            What an error calls it.
+
+        Raises
+        ------
+        ValueError
+            If the system has a delay or a parameter, or is an equation.
+        """
+        if not self.is_rational:
             raise ValueError(f"{name} must hold no delay and no parameter, got {self!r:.200}")
         return self.numerator.whole(), self.denominator.whole()
 
@@ -812,8 +839,7 @@ class System:
         if self.shown:
             return self.shown
         text = self._equation()
-        is_rational = not (self.parameters or self.longest_delay or self.is_equation)
-        if len(text) > _LONGEST_RATIONAL and is_rational:
+        if len(text) > _LONGEST_RATIONAL and self.is_rational:
             zeros, poles = (tuple(roots.tolist()) for roots in (self.zeros(), self.poles()))
             return f"Controller(zeros={zeros}, poles={poles}, gain={self.gain})"
         if len(text) > _LONGEST_TEXT:
@@ -848,7 +874,7 @@ class System:
         TypeError, ValueError
             If the system has delays, or is an equation, or a parameter has no nominal value.
         """
-        return self._roots_of("poles", self.denominator)
+        return self._roots_of("poles")
 
     def zeros(self) -> ComplexArray:
         """Return the zeros of a system without delays, in rad/s, as python-control has them.
@@ -858,19 +884,19 @@ class System:
         TypeError, ValueError
             As `poles`.
         """
-        return self._roots_of("zeros", self.numerator)
+        return self._roots_of("zeros")
 
-    def _roots_of(self, what: str, part: Sum) -> ComplexArray:
-        """Return the roots of numerator or denominator, with nominal parameters."""
-        if self.is_equation or any(self.numerator.lags | self.denominator.lags):
+    def _roots_of(self, what: str) -> ComplexArray:
+        """Return the zeros or the poles, with nominal parameters."""
+        if self.is_equation or self.longest_delay:
             raise ValueError(
                 f"{what} are those of a system without delays, got {self!r:.200}: write "
                 "armlock.characteristic_roots(L, right_of=...), which has the roots of an "
                 "equation, or of the closed loop of L"
             )
-        given = self.given((), {}).items()
-        values = {k: Sum.of(fmpq_poly([exact_number(k, v)])) for k, v in given}
-        return np.array(Polynomial.of(part.put(values).whole()).roots, np.complex128)
+        above, below = self.at(**self.given((), {})).rational()
+        part = above if what == "zeros" else below
+        return np.array(Polynomial.of(part).roots, np.complex128)
 
     def isdtime(self, strict: bool = False) -> bool:
         """Whether time is discrete: it is not. So python-control's plots take the system."""
@@ -961,7 +987,10 @@ def proportion(first: Sum, second: Sum) -> fmpq | None:
 
 
 def _reduced(n: Sum, m: Sum, powers: bool) -> tuple[Sum, Sum]:
-    """Divide out the delay objects that all terms hold, and if asked a common power of s."""
+    """Divide out the delay objects that all terms hold, and if asked a common power of s.
+
+    Raise if all terms of M, or of an equation, are still delayed.
+    """
     terms = [*n.terms.items(), *m.terms.items()]
     if not terms:
         raise ValueError("an equation must not be zero everywhere")

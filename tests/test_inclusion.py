@@ -15,7 +15,7 @@ import pytest
 from armlock.engine import inclusion
 from armlock.engine.functions import Function, Space, compiled
 from armlock.engine.inclusion import EPSILON
-from armlock.engine.polynomials import Polynomial, exact, of_roots
+from armlock.engine.polynomials import Polynomial, exact, of_roots, rounded
 from armlock.systems import Lag
 
 mp = mpmath.mp.clone()
@@ -49,7 +49,7 @@ def draw_polynomial(rng, degree):
         else:
             roots.append(complex(rng.choice([-1.0, 1.0, 0.0]) * near))
     p = Polynomial.of(of_roots(roots) * exact(rng.normal()))
-    return Polynomial.of(p.coefficients.tolist()) if rng.random() < 0.4 else p
+    return Polynomial.of(rounded(p.exact.coeffs())) if rng.random() < 0.4 else p
 
 
 def draw(rng, most=6, delays=4, longest=2.0):

@@ -1,6 +1,7 @@
 """Expressions of delays and parameters: what they mean, and what is refused."""
 
 import copy
+import inspect
 import pickle
 from functools import partial
 
@@ -174,10 +175,30 @@ def test_no_start_of_a_ray_is_assumed_where_a_parameter_has_no_nominal_value():
     assert found == first_crossing(loop, (0.5, 0.1), (1.0, 0.0))
 
 
-@pytest.mark.parametrize("name", ["step", "direction", "omega_max", "free_above", "s"])
-def test_a_parameter_with_the_name_of_an_argument_is_refused(name):
-    with pytest.raises(ValueError, match=f"^name must not be an argument .* got '{name}'"):
-        parameter(name)
+def test_a_parameter_with_the_name_of_an_argument_is_refused():
+    functions = [getattr(armlock, name) for name in armlock.__all__]
+    functions += [System.__call__, System.frequency_response, System.affine_in, System.at]
+    signatures = [inspect.signature(f).parameters for f in functions if inspect.isfunction(f)]
+    by_keyword = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY
+    names = {
+        argument.name
+        for arguments in signatures
+        if "numbers" in arguments or "values" in arguments
+        for argument in arguments.values()
+        if argument.kind in by_keyword
+    }
+    assert {"self", "system", "loop", "omega_max", "longest", "z"} <= names
+    for name in names:
+        with pytest.raises(ValueError, match=f"^name must not be an argument .* '{name}'"):
+            parameter(name)
+
+
+def test_any_other_name_is_put_in_where_parameters_are_multiplied():
+    names = "free", "numbers", "values", "name", "direction"
+    for name in names:
+        product = parameter(name, 2.0) * parameter("gain", 3.0) / s
+        assert product(1j, **{name: 5.0}) == 15.0 / 1j
+        assert unstable_roots(product, **{name: -5.0}) == 1
 
 
 def test_two_nominal_values_of_one_parameter_are_refused():

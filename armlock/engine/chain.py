@@ -1,4 +1,4 @@
-"""Delay objects, and the neutral chain: whether it is confined, and where it ends.
+"""The neutral chain of products of delay objects: whether it is confined, and where it ends.
 
 At high frequency a function of s is its highest power times A + sum A_k z_k, with one z_k for
 each product of delay objects. The neutral chain counts as confined where abs(A) exceeds the sum
@@ -58,12 +58,28 @@ def _on_torus(
     rows: FloatArray,
     free: float,
     measure: Callable[[ComplexArray], FloatArray],
-    share: float = _ROUNDING,
+    share: float,
 ) -> float:
     """Return a lower bound of a measure - free on the unit torus: `_SHARE` of it, or 0.
 
-    It is 0 up to a share of all coefficients. The measure of some P, one for each row of
-    coefficients, changes by no more than they do.
+    Parameters
+    ----------
+    powers : float array, shape (1 + K, objects)
+        Of delay objects in the undelayed term and in the K products.
+    rows : float array, shape (number of P, 1 + K)
+        The coefficients of each P.
+    free : float
+        Size of terms of any phase.
+    measure : callable
+        Takes the values of all P, shape (n, number of P), and returns shape (n,). It changes
+        by no more than the values do, added up.
+    share : float
+        What is below this share of all coefficients is taken as 0.
+
+    Raises
+    ------
+    UndecidedError
+        If it takes more cells than `_MOST_CELLS`.
     """
     number, slope = powers.shape[1], np.abs(rows).sum(0) @ np.abs(powers)
     rounding, least = (part * float(np.abs(rows).sum()) for part in (_ROUNDING, share))

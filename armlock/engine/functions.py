@@ -319,7 +319,7 @@ class Function:
         return not (self.steady.any() or self.delayed.any())
 
     def series(self, number: int) -> list[fmpq]:
-        """First coefficients of the Taylor series at s = 0, exactly; at most 16."""
+        """First coefficients of the Taylor series at s = 0, exactly."""
         out = [fmpq(0)] * number
         for p, s, row in zip(self.space.polynomials, self.steady, self.delayed, strict=True):
             acting = [(w, t) for w, t in zip(row, self.space.delays, strict=True) if w]
@@ -365,7 +365,11 @@ class Function:
         return float(self.space.radius(weights, [order], [log(coefficient)], share)[0])
 
     def value_and_slope(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """F and its derivative at any s, shape (n,), both times one number at each s."""
+        """F and its derivative at any s, shape (n,), both divided by one number at each s.
+
+        The number keeps a product of many factors from overflowing. It does not change the
+        quotient of the two, which is a step of Newton's method.
+        """
         arrays, (steady, delayed) = self.space.arrays, self.weights
         value, slope = np.zeros_like(s), np.zeros_like(s)
         by = 1.0 / (np.abs(s)[:, None] + arrays.scale)
@@ -385,7 +389,7 @@ class Function:
         return value, slope
 
     def in_ball(self, s: acb) -> acb:
-        """Evaluate at a ball of python-flint, with its context's precision."""
+        """Evaluate at a ball of python-flint, with the bits of python-flint's context."""
         found, turns = acb(0), [(-s * theta).exp() - 1 for theta in self.space.delays]
         for p, steady, row in zip(
             self.space.polynomials, self.steady, self.delayed, strict=True

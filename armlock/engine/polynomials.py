@@ -21,8 +21,6 @@ _Term = TypeVar("_Term", bound=Any)
 
 # Bits to which roots are found; lightly damped pairs keep the digits of their damping.
 _BITS = 128
-# So many values at once stay in a processor's cache, which takes half the time.
-_BLOCK = 1 << 13
 
 # python-flint pickles its fractions, but not its polynomials.
 copyreg.pickle(fmpq_poly, lambda p: (fmpq_poly, (p.coeffs(),)))
@@ -74,8 +72,8 @@ class Polynomial:
         return bool(self.exact)
 
     def __repr__(self) -> str:
-        """List the coefficients."""
-        return repr(self.coefficients.tolist())
+        """List the coefficients, rounded."""
+        return repr(rounded(self.exact.coeffs()).tolist())
 
     @cached_property
     def lead(self) -> fmpq:
@@ -86,16 +84,6 @@ class Polynomial:
     def degree(self) -> int:
         """The degree."""
         return len(self.roots)
-
-    @property
-    def order(self) -> int:
-        """Order of the root at s = 0."""
-        return self.roots.count(0j)
-
-    @cached_property
-    def coefficients(self) -> FloatArray:
-        """Coefficients in ascending powers of s, rounded; inf where a number overflows."""
-        return rounded(self.exact.coeffs() or [fmpq(0)])
 
 
 def exact(value: Any) -> fmpq:

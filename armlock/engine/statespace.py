@@ -26,7 +26,7 @@ ROUNDED = fmpq(512, 2**53)
 #: What rounding makes of a root of a polynomial that was multiplied out: this share of the
 #: largest root. python-control makes as much of state spaces in coordinates of some condition.
 MULTIPLIED = fmpq(1, 2**39)
-# So many of the lowest coefficients are asked.
+# Bounds are computed of so many of the lowest coefficients of a polynomial.
 _ASKED = 3
 # What is counted by each number that may be stated.
 _COUNTED = {"integrators": "poles", "zeros": "zeros", "at_zero": "roots"}
@@ -60,7 +60,18 @@ def settled(
     series : sequence of Lowest
         Of all products of parameters, beginning with what stands before none.
     cleared : int, optional
-        How many roots at s = 0 come from clearing denominators.
+        How many roots at s = 0 come from clearing denominators, for the text of an error.
+
+    Returns
+    -------
+    int
+        The number that is stated, 0 by default.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the number is not whole or negative, contradicts the coefficients by more than
+        rounding, or rounding hides the next coefficient.
     """
     stated = whole_number(name, 0 if number is None else number, 0)
     size = len(series[0].coefficients)
@@ -95,7 +106,20 @@ def settled(
 def of_matrices(
     matrices: Sequence[Any], integrators: int | None, zeros: int | None
 ) -> tuple[fmpq_poly, fmpq_poly]:
-    """Return numerator and denominator of C (s - A)^-1 B + D of matrices of floats."""
+    """Return numerator and denominator of C (s - A)^-1 B + D.
+
+    Parameters
+    ----------
+    matrices : sequence of four nested lists of float
+        A, B, C and D, of shapes (n, n), (n, 1), (1, n) and (1, 1).
+    integrators, zeros : int or None
+        How many poles and zeros are at s = 0, if they are stated.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `settled`.
+    """
     a, b, c, ((d,),) = matrices
     if not len(a):
         return polynomial([d]), polynomial([1])
@@ -110,7 +134,13 @@ def of_matrices(
 def of_coefficients(
     above: Any, below: Any, integrators: int | None, zeros: int | None
 ) -> tuple[fmpq_poly, fmpq_poly]:
-    """Return a quotient of polynomials that were multiplied out, in ascending powers."""
+    """Return a quotient of polynomials that were multiplied out, of floats in ascending powers.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `settled`.
+    """
     above, below = polynomial(above), polynomial(below)
     through = above[below.degree()] / below.leading_coefficient()
     bounds = _bounds_of_product(Polynomial.of(below)), _bounds_of_product(Polynomial.of(above))

@@ -83,14 +83,14 @@ class Quotient:
             Of the values.
         """
         found, errors = np.empty(s.shape, np.complex128), np.empty(s.shape)
-        # Far on the right exponentials vanish beside one.
+        # Far on the right exp(-s theta) - 1 is rounded to -1: exp(-s theta) is used there.
         far = s.real * self.delays[:1].sum() > 1.0
-        for part in (far, ~far) if far.any() and not far.all() else (np.ones_like(far),):
+        for part in (far, ~far):
             places = np.flatnonzero(part)
             for first in range(0, places.size, _BLOCK):
                 k = places[first : first + _BLOCK]
                 xs = [x[k] if isinstance(x, np.ndarray) else x for x in numbers]
-                found[k], errors[k] = self._some(s[k], xs, bool(far[k[0]]))
+                found[k], errors[k] = self._some(s[k], xs, part is far)
         if self.below:
             errors[s == 0.0] = np.nan
         for i in np.flatnonzero(np.isnan(errors)):

@@ -62,7 +62,10 @@ def transfer(
 
 
 def responses(loop: Loop, s: npt.ArrayLike, sources: Sequence[str]) -> dict[str, ComplexArray]:
-    """Evaluate the responses to several inputs, as `transfer` gives them one by one."""
+    """Evaluate the responses to several inputs, as `transfer` gives them one by one.
+
+    The response to "laser" is always among them. Each is shaped like `s`, in rad/s.
+    """
     # The loop is evaluated once for all of them.
     sensitivity = 1.0 / (1.0 + checked_loop(loop)(s))
     found = {
