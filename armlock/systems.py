@@ -44,6 +44,7 @@ from armlock.engine.polynomials import (
     of_roots,
     order,
     polynomial,
+    series,
 )
 from armlock.engine.statespace import ROUNDED, Lowest, settled
 from armlock.typeset import number, written
@@ -300,12 +301,7 @@ class Sum:
 
     def series(self, number: int, names: tuple[str, ...] = ()) -> list[fmpq]:
         """Return the first coefficients at s = 0 of what stands before parameters, exactly."""
-        found = [fmpq(0)] * number
-        for lag, p in self.before(*names).items():
-            for i in range(min(number, len(p))):
-                for k in range(i, number):
-                    found[k] += p[i] * (-lag.time) ** (k - i) / factorial(k - i)
-        return found
+        return series(((lag.time, p) for lag, p in self.before(*names).items()), number)
 
     def order(self) -> int:
         """Return the order of the zero at s = 0 that it has for all values of parameters."""

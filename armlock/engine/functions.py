@@ -18,12 +18,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from flint import acb, acb_poly, fmpq
+from flint import acb, acb_poly, fmpq, fmpq_poly
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray
 from armlock.engine import chain, inclusion
 from armlock.engine.inclusion import EPSILON, Arrays
-from armlock.engine.polynomials import Polynomial, exact, order, polynomial, rounded
+from armlock.engine.polynomials import (
+    Polynomial,
+    exact,
+    order,
+    polynomial,
+    rounded,
+    series,
+)
 
 if TYPE_CHECKING:
     from armlock.systems import Lag
@@ -318,21 +325,22 @@ class Function:
         """Whether the function is zero everywhere."""
         return not (self.steady.any() or self.delayed.any())
 
+    @cached_property
+    def by_delay(self) -> list[tuple[fmpq, fmpq_poly]]:
+        """The function as polynomials times exp(-s theta): pairs of theta and polynomial."""
+        now = self.steady - self.delayed.sum(axis=1)
+        columns = [(fmpq(0), now), *zip(self.space.delays, self.delayed.T, strict=True)]
+        found = []
+        for theta, weights in columns:
+            pairs = zip(self.space.polynomials, weights, strict=True)
+            p = sum((p.exact * w for p, w in pairs if w), fmpq_poly([0]))
+            if p:
+                found.append((theta, p))
+        return found
+
     def series(self, number: int) -> list[fmpq]:
         """First coefficients of the Taylor series at s = 0, exactly."""
-        out = [fmpq(0)] * number
-        for p, s, row in zip(self.space.polynomials, self.steady, self.delayed, strict=True):
-            acting = [(w, t) for w, t in zip(row, self.space.delays, strict=True) if w]
-            e = [s] + [
-                sum((w * (-t) ** i for w, t in acting), fmpq(0)) / math.factorial(i)
-                for i in range(1, number)
-            ]
-            for i, a in enumerate(p.exact.coeffs()[:number]):
-                if a:
-                    for k in range(number - i):
-                        if e[k]:
-                            out[i + k] += a * e[k]
-        return out
+        return series(self.by_delay, number)
 
     @cached_property
     def lowest(self) -> tuple[int, fmpq] | None:
@@ -390,17 +398,8 @@ class Function:
 
     def in_ball(self, s: acb) -> acb:
         """Evaluate at a ball of python-flint, with the bits of python-flint's context."""
-        found, turns = acb(0), [(-s * theta).exp() - 1 for theta in self.space.delays]
-        for p, steady, row in zip(
-            self.space.polynomials, self.steady, self.delayed, strict=True
-        ):
-            total = acb(steady)
-            for weight, turn in zip(row, turns, strict=True):
-                if weight:
-                    total += turn * weight
-            if steady or any(row):
-                found += acb_poly(p.exact)(s) * total
-        return found
+        terms = (acb_poly(p)(s) * (-s * theta).exp() for theta, p in self.by_delay)
+        return sum(terms, acb(0))
 
     def shifted(self, sigma: float) -> tuple[Space, inclusion.Functions]:
         """Return the function s -> F(s + sigma): its space, and its weights.

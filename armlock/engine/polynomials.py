@@ -6,6 +6,7 @@ import copyreg
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
+from math import factorial
 from operator import mul
 from typing import Any, TypeVar
 
@@ -118,6 +119,14 @@ def on_axis(p: fmpq_poly, q: fmpq_poly) -> fmpq_poly:
     """Return Re(p conj(q)) at s = j omega as a polynomial of omega^2."""
     product = p * q(polynomial([0, -1]))
     return fmpq_poly([(-1) ** k * c for k, c in enumerate(product.coeffs()[::2])])
+
+
+def series(parts: Iterable[tuple[fmpq, fmpq_poly]], number: int) -> list[fmpq]:
+    """Return the first coefficients at s = 0 of a sum of polynomials times exp(-s theta)."""
+    whole = fmpq_poly([0])
+    for theta, p in parts:
+        whole += p * fmpq_poly([(-theta) ** k / factorial(k) for k in range(number)])
+    return [whole[k] for k in range(number)]
 
 
 def of_roots(roots: Iterable[complex]) -> fmpq_poly:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import flint
 import numpy as np
 import numpy.typing as npt
-from flint import acb, acb_poly, arb, fmpq, fmpq_poly
+from flint import acb, acb_poly, arb, fmpq_poly
 
 from armlock.checks import ComplexArray, FloatArray, real_number
 from armlock.engine import chain, decide, inclusion
@@ -122,16 +122,8 @@ class _Balls:
     """F(s) / s^common in balls, as polynomials times exponentials."""
 
     def __init__(self, function: Function, common: int) -> None:
-        polynomials = [p.exact for p in function.space.polynomials]
         self.common, self.unit = common, 1.0 / (function.space.longest or 1.0)
-        now = function.steady - function.delayed.sum(axis=1)
-        columns = [(fmpq(0), now), *zip(function.space.delays, function.delayed.T, strict=True)]
-        self.parts = []
-        for theta, weights in columns:
-            terms = (p * w for p, w in zip(polynomials, weights, strict=True) if w)
-            p = sum(terms, fmpq_poly([0]))
-            if p:
-                self.parts.append((theta, _taylor(p)))
+        self.parts = [(theta, _taylor(p)) for theta, p in function.by_delay]
         self.rounded: dict[int, list[tuple[arb, list[acb_poly]]]] = {}
 
     def series(self, s: acb, number: int) -> list[acb]:
