@@ -26,6 +26,7 @@ from armlock import (
     characteristic_roots,
     delay,
     equation,
+    first_crossing,
     paper_loop,
     parameter,
     rightmost_root,
@@ -192,6 +193,20 @@ def test_cubes_of_an_average_have_the_root_of_their_unit_of_time(h):
 def test_a_map_without_memory_has_no_root():
     with pytest.raises(ValueError, match=r"^the parameters must leave a loop with roots"):
         rightmost_root(DEADBEAT, 0.0, 0.0)
+
+
+def test_a_delay_of_a_map_is_its_number_of_steps_whatever_rounding_leaves():
+    # As floats, 0.3 is less than three times 0.1.
+    back, x = delay(0.1), parameter("x")
+    for third in (delay(0.3), back**3):
+        found = characteristic_roots(
+            equation(1 - 0.1 * back - 0.5 * third, 0.1), right_of=-30.0
+        ).values
+        expected = np.log(np.roots([1.0, -0.1, 0.0, -0.5]).astype(complex)) / 0.1
+        assert np.sort_complex(found) == pytest.approx(np.sort_complex(expected), rel=1e-9)
+        # With x = -1 both terms are opposed to 1 at s = j pi / step.
+        opposed = first_crossing(equation(1 - x * (back + third) / 2, 0.1), [0.0], [-1.0])
+        assert opposed == pytest.approx((1.0, 10.0 * np.pi), rel=1e-9)
 
 
 def test_a_dead_time_sets_the_growth_of_a_neutral_loop():

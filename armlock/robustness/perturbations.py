@@ -14,7 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import fmpq
 
-from armlock.checks import FloatArray, finite_series, positive_number, real_number
+from armlock.checks import (
+    FloatArray,
+    finite_series,
+    positive_number,
+    real_number,
+    whole_steps,
+)
 from armlock.engine import decide
 from armlock.engine.affine import Affine, NotAffineError
 from armlock.engine.decide import BOUNDARY, UNCONFINED, Family
@@ -180,10 +186,12 @@ class _Ray:
 
 def _at_the_end(function: Function) -> fmpq:
     """Return a function of a map at the end of its axis, s = j pi / step, exactly."""
-    step = exact(function.space.step)
-    turns = [fmpq(-1) ** int(theta / step) - 1 for theta in function.space.delays]
-    found: fmpq = function.steady.sum() + (function.delayed @ turns).sum()
-    return found
+    step = function.space.step
+    terms = (
+        p[0] * (-1) ** whole_steps("delay", float(theta), step)
+        for theta, p in function.by_delay
+    )
+    return sum(terms, fmpq(0))
 
 
 def first_crossing(

@@ -18,12 +18,12 @@ import numpy as np
 import numpy.typing as npt
 from flint import acb, acb_poly, arb, fmpq_poly
 
-from armlock.checks import ComplexArray, FloatArray, real_number
+from armlock.checks import ComplexArray, FloatArray, real_number, whole_steps
 from armlock.engine import chain, decide, inclusion
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, Space, common_zeros
-from armlock.engine.polynomials import enclosed_roots, exact, order
+from armlock.engine.polynomials import enclosed_roots, order
 from armlock.stability.counts import CountError, at_points, count_exactly, decided, place
 from armlock.systems import System
 
@@ -442,20 +442,16 @@ def _of_polynomial(function: Function, common: int) -> list[_Disc] | None:
 
     Those of a map are logarithms of the roots of one polynomial of exp(s step).
     """
-    space, step = function.space, exact(function.space.step)
-    if step and function.delayed.any():
-        backs = [int(theta / step) for theta in space.delays]
-        if max(backs) > _LARGEST_MAP:
-            return None
-        p = fmpq_poly([0])
-        now = function.steady.sum() - function.delayed.sum()
-        for back, weight in zip((0, *backs), (now, *function.delayed.sum(axis=0)), strict=True):
-            p += weight * fmpq_poly([0, 1]) ** (max(backs) - back)
-    elif function.delayed.any():
+    step, parts = function.space.step, function.by_delay
+    if not step and any(theta for theta, _ in parts):
         return None
-    else:
-        parts = zip(space.polynomials, function.steady, strict=True)
-        p = sum((weight * p.exact for p, weight in parts), fmpq_poly([0]))
+    backs = [whole_steps("delay", float(theta), step) if step else 0 for theta, _ in parts]
+    most = max(backs, default=0)
+    if most > _LARGEST_MAP:
+        return None
+    p = fmpq_poly([0])
+    for back, (_, part) in zip(backs, parts, strict=True):
+        p += part * fmpq_poly([0, 1]) ** (most - back)
     p //= fmpq_poly([-1 if step else 0, 1]) ** common
     if step and p:
         p //= fmpq_poly([0, 1]) ** order(p.coeffs())
