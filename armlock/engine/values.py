@@ -50,7 +50,7 @@ class Quotient:
         # Weights over the largest of M: those of many fast poles would overflow.
         sizes = [abs(x) for f in m for x in (*f.steady, *f.delayed.ravel())]
         scale = max(sizes, default=fmpq(0)) or fmpq(1)
-        space = (n or m)[0].space
+        space = n[0].space
         self.delays, self.tails = space.arrays.delays[:, None], space.arrays.tails[:, None]
         self.above, self.below = _Sum(n, scale), _Sum(m, scale) if m else None
         over = self.below.common if self.below else Counter()
@@ -83,7 +83,7 @@ class Quotient:
             Of the values.
         """
         found, errors = np.empty(s.shape, np.complex128), np.empty(s.shape)
-        # Far on the right exp(-s theta) - 1 is rounded to -1: exp(-s theta) is used there.
+        # Far on the right exp(-s theta) is small: it is summed itself, and not less one.
         far = s.real * self.delays[:1].sum() > 1.0
         for part in (far, ~far):
             places = np.flatnonzero(part)
