@@ -47,7 +47,7 @@ from armlock.engine.polynomials import (
     series,
 )
 from armlock.engine.statespace import ROUNDED, Lowest, settled
-from armlock.typeset import number, written
+from armlock.typeset import fraction, written
 
 if TYPE_CHECKING:
     import control
@@ -818,10 +818,10 @@ class System:
 
     def _equation(self, latex: bool = False) -> str:
         """Return the equation as one writes it."""
-        above = written(self.numerator, latex)
+        above = written(self.numerator.terms, latex)
         if self.is_equation:
             return f"{above} = 0"
-        below = written(self.denominator, latex)
+        below = written(self.denominator.terms, latex)
         if latex:
             return above if below == "1" else rf"\frac{{{above}}}{{{below}}}"
         return above if below == "1" else f"[{above}] / [{below}]"
@@ -996,7 +996,7 @@ def _reduced(n: Sum, m: Sum, powers: bool) -> tuple[Sum, Sum]:
     if NOW not in {lag.times(early) for lag, _ in (m or n).terms}:
         raise ValueError(
             "the system must be causal: every term of its denominator is delayed by "
-            f"{' and '.join(sorted({number(lag.time) for lag, _ in (m or n).terms}))} s"
+            f"{' and '.join(sorted({fraction(lag.time) for lag, _ in (m or n).terms}))} s"
         )
     power = 0
     if powers and not [p for _, p in terms if p[0]]:

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from decimal import Decimal
-from typing import TYPE_CHECKING
+from typing import Any
 
 from flint import fmpq, fmpq_poly
 
-if TYPE_CHECKING:
-    from armlock.systems import Lag, Sum
 
-
-def written(found: Sum, latex: bool = False) -> str:
-    """Return a sum as one writes it."""
+def written(terms: Mapping[Any, fmpq_poly], latex: bool = False) -> str:
+    """Return the terms of a sum, {(lag, names): polynomial}, as one writes them."""
     shown = []
     for (lag, names), p in sorted(
-        found.terms.items(), key=lambda term: (term[0][0].time, term[0][1])
+        terms.items(), key=lambda term: (term[0][0].time, term[0][1])
     ):
         factors = [*names]
         if lag:
-            factors.append(_exponential(lag, latex))
+            factors.append(_exponential(lag.time, latex))
         power = _powers(p, latex)
-        several = sum(map(bool, p.coeffs())) > 1 and (factors or len(found.terms) > 1)
+        several = sum(map(bool, p.coeffs())) > 1 and (factors or len(terms) > 1)
         if factors and power in ("1", "-1"):
             shown.append(power[:-1] + " ".join(factors))
         else:
@@ -29,7 +27,7 @@ def written(found: Sum, latex: bool = False) -> str:
     return " + ".join(shown).replace("+ -", "- ") or "0"
 
 
-def number(value: fmpq) -> str:
+def fraction(value: fmpq) -> str:
     """Return a fraction, which may be no float, with six digits."""
     try:
         if value == 0 or abs(float(value)) > 1e-300:
@@ -39,9 +37,9 @@ def number(value: fmpq) -> str:
     return f"{Decimal(int(value.p)) / int(value.q):.5e}"
 
 
-def _exponential(lag: Lag, latex: bool) -> str:
+def _exponential(time: fmpq, latex: bool) -> str:
     """Return exp(-s theta) as text."""
-    exponent = f"-{number(lag.time)} s"
+    exponent = f"-{fraction(time)} s"
     return f"e^{{{exponent}}}" if latex else f"exp({exponent})"
 
 
@@ -50,7 +48,7 @@ def _powers(p: fmpq_poly, latex: bool) -> str:
     shown = []
     for k, c in reversed(list(enumerate(p.coeffs()))):
         if c:
-            digits, power = number(c), ("", "s", f"s^{{{k}}}" if latex else f"s^{k}")
+            digits, power = fraction(c), ("", "s", f"s^{{{k}}}" if latex else f"s^{k}")
             symbol = power[min(k, 2)]
             if symbol and digits in ("1", "-1"):
                 digits = digits[:-1]

@@ -32,16 +32,8 @@ LAYERS = [
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_imports_go_one_way(path):
     here = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-    tree = ast.parse(path.read_text("utf-8"))
-    # What only annotations name is not imported.
-    types = [
-        node
-        for branch in ast.walk(tree)
-        if isinstance(branch, ast.If) and ast.unparse(branch.test) == "TYPE_CHECKING"
-        for node in branch.body
-    ]
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.ImportFrom) or not node.module or node in types:
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if not isinstance(node, ast.ImportFrom) or not node.module:
             continue
         package, *inner = node.module.split(".")
         if package != "armlock":

@@ -11,21 +11,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpq_poly
 
 from armlock.checks import ComplexArray, FloatArray
+from armlock.engine.chain import Product
 from armlock.engine.functions import Function, Space
 from armlock.engine.polynomials import Polynomial, collected, exact, order
 from armlock.engine.values import Quotient
 
-if TYPE_CHECKING:
-    from armlock.systems import Lag
-
 #: A sum: polynomials by the products of delays that they are multiplied by.
-Part = Mapping["Lag", fmpq_poly]
+Part = Mapping[Any, fmpq_poly]
 
 
 class NotAffineError(ValueError):
@@ -89,7 +87,7 @@ def functions(
             for group in groups
         ]
     union: list[fmpq_poly] = []
-    lags: set[Lag] = set()
+    lags: set[Product] = set()
     rows = []
     for group in groups:
         # What is left of each sum at s = 0, and what stands before its delays.
@@ -116,7 +114,7 @@ def functions(
 
 def _delays_are_lengths(parts: Sequence[Part]) -> bool:
     """Tell whether equally long delays differ in no way, as none acts on the highest power."""
-    times: dict[fmpq, Lag] = {}
+    times: dict[fmpq, Product] = {}
     late, now, unequal = -1, -1, False
     for part in parts:
         for lag, p in part.items():

@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from flint import fmpq
 
 from armlock.checks import ComplexArray, FloatArray
 from armlock.engine.polynomials import rounded
-
-if TYPE_CHECKING:
-    from armlock.systems import Delay, Lag
 
 # On the torus a P that is smaller than this share of its coefficients is zero; and where a
 # candidate is looked for.
@@ -32,18 +29,35 @@ _SHARE = 0.8
 _MOST_TURNS, _FINE = 500, 1e-9
 
 
+class Product(Protocol):
+    """A product of delay objects (`armlock.systems.Lag`): pairs of an object and its power."""
+
+    @property
+    def time(self) -> fmpq:
+        """Its length in s."""
+
+    def __iter__(self) -> Iterator[tuple[Any, int]]:
+        """Iterate over the pairs."""
+
+    def __len__(self) -> int:
+        """Return the number of pairs."""
+
+    def __hash__(self) -> int:
+        """Hash it."""
+
+
 class UndecidedError(RuntimeError):
     """Double precision, or the steps allowed, did not decide."""
 
 
-def own_phases(lags: Iterable[Lag]) -> tuple[list[Lag], list[Lag]]:
+def own_phases(lags: Iterable[Product]) -> tuple[list[Product], list[Product]]:
     """Return the products whose phase is free, and those that are left.
 
     The phase of a product with an object of its own is free, whatever all others are. Taken
     out, it may leave others with an object of their own.
     """
-    left: list[Lag] = [lag for lag in lags if lag]
-    free: list[Lag] = []
+    left: list[Product] = [lag for lag in lags if lag]
+    free: list[Product] = []
     while True:
         used = Counter(delay for lag in left for delay, _ in lag)
         own = [lag for lag in left if any(used[delay] == 1 for delay, _ in lag)]
@@ -104,7 +118,7 @@ def _on_torus(
     return kept
 
 
-def _powers(lags: Iterable[Sequence[tuple[Delay, int]]]) -> FloatArray:
+def _powers(lags: Iterable[Iterable[tuple[Any, int]]]) -> FloatArray:
     """Return the powers of all delay objects in some products, shape (products, objects)."""
     lags = list(lags)
     objects = sorted({d for lag in lags for d, _ in lag}, key=lambda d: d.mark)
@@ -120,7 +134,7 @@ def reserve(still: FloatArray, late: FloatArray) -> FloatArray:
 
 
 def _loosened(
-    lags: Sequence[Lag], n: FloatArray, m: FloatArray
+    lags: Sequence[Product], n: FloatArray, m: FloatArray
 ) -> tuple[FloatArray, FloatArray, float]:
     """Take products of free phase out of two P: what is left, its powers, and their size.
 
@@ -136,13 +150,13 @@ def _loosened(
 
 
 def arc_reserve(
-    lags: Sequence[Lag], n: FloatArray, m: FloatArray, angle: float, loose: float = 0.0
+    lags: Sequence[Product], n: FloatArray, m: FloatArray, angle: float, loose: float = 0.0
 ) -> float:
     """Bound abs(P_M + exp(j psi) P_N) - loose from below, for all abs(psi) <= angle (Lemma 24).
 
     Parameters
     ----------
-    lags : sequence of Lag
+    lags : sequence of Product
         The K products.
     n, m : float arrays, shape (1 + K,)
         The coefficients of two P: that of the undelayed term, and those of the products.
@@ -172,7 +186,7 @@ def arc_reserve(
 
 
 def arc_limit(
-    lags: Sequence[Lag], n: FloatArray, m: FloatArray, loose: float = 0.0
+    lags: Sequence[Product], n: FloatArray, m: FloatArray, loose: float = 0.0
 ) -> tuple[float, bool]:
     """Largest angle up to which `arc_reserve` is positive, and whether it is found.
 
@@ -230,7 +244,7 @@ def line_limit(f: Sequence[fmpq], g: Sequence[fmpq], start: fmpq, rounding: fmpq
     return math.inf
 
 
-def real_part_limit(lags: Sequence[Lag], still: float, late: FloatArray) -> float:
+def real_part_limit(lags: Sequence[Product], still: float, late: FloatArray) -> float:
     """Limit right of which the chain has no roots; -inf without a chain.
 
     Unless products share objects, the real parts of the roots tend to it.

@@ -14,7 +14,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -31,9 +31,6 @@ from armlock.engine.polynomials import (
     rounded,
     series,
 )
-
-if TYPE_CHECKING:
-    from armlock.systems import Lag
 
 Exact = npt.NDArray[np.object_]
 # Most coefficients of a series at s = 0 of which one has to differ from zero.
@@ -75,7 +72,7 @@ class Space:
     ----------
     polynomials : sequence of Polynomial
         Not zero.
-    lags : iterable of Lag
+    lags : iterable of Product
         Products of delay objects, each of them once. Those of length zero do not count.
     step : float, optional
         Sampling step in s of which all delays are multiples, if the functions are those of a
@@ -88,7 +85,7 @@ class Space:
     def __init__(
         self,
         polynomials: Sequence[Polynomial],
-        lags: Iterable[Lag],
+        lags: Iterable[chain.Product],
         step: float = 0.0,
         at_zero: int | None = None,
     ) -> None:
