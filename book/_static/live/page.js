@@ -446,12 +446,15 @@ function armlockPages() {
       })));
   }
 
+  // Of the pages where a loop can be pinned.
+  const PINNED = " Dashed curves: the pinned loop.";
+
   function legend(more = "") {
     return element("p", { class: "live-note" }, "Move over the chart for a preview. A click or a tap holds the point. "
       + "On the D-curve a root lies on the imaginary axis, from low frequency (blue) to high (yellow), or is 0 (straight line). "
       + "It is drawn where it bounds the stable region. "
       + "Cross: the ideal point (1, 1). Dots: the critical perturbations along four directions, the smallest one filled. Square, in small charts: "
-      + `the paper\u2019s perturbations, up to 10\u207b\u2076. Dashed curves: the pinned loop.${more}`);
+      + `the paper\u2019s perturbations, up to 10\u207b\u2076.${more}`);
   }
 
   const figures = (...all) => element("div", { class: "live-two" }, ...all);
@@ -489,7 +492,7 @@ function armlockPages() {
     const { live: name, centre, half } = place.dataset, live = new Live(`${name}: number of unstable roots over `
       + "c1 and c2.");
     place.replaceChildren(figures(live.figure, live.plots[0].figure), tools(live, name.toLowerCase().replace(/\W+/g, "-"), [live.chart.sheet, ...live.plots]),
-      legend(), live.note, live.plots[1].figure, live.following);
+      legend(PINNED), live.note, live.plots[1].figure, live.following);
     live.chart.show([Number(centre), Number(centre)], Number(half));
     live.set(PRESETS[name][0]);
   }
@@ -771,7 +774,7 @@ function armlockPages() {
     on("touchstart", event => { if (caught) event.preventDefault(); });
 
     const [nyquist, bode] = live.plots, plane = element("figure", { class: "live-plane" },
-      element("figcaption", {}, "Poles \u00d7 and zeros \u25cb of the controller: drag them"), roots.canvas);
+      element("figcaption", {}, "Poles \u00d7 and zeros \u25cb of the controller"), roots.canvas);
     live.heard = () => roots.draw();
     bode.figure.classList.add("live-bode");
     place.replaceChildren(element("div", { class: "live-own" },
@@ -780,7 +783,8 @@ function armlockPages() {
           button("Whole", () => live.chart.show([0, 0], 3)), button("Copy numbers", () => live.copy())), live.note, live.numbers),
       element("div", { class: "live-side" }, element("div", { class: "live-top" }, preset, wrong),
         element("div", { class: "live-panel" }, live.summary, gain, dead),
-        element("div", { class: "live-paste" }, paste, understood, around, doubt), element("div", { class: "live-fields" }, inputs, legend(" In the s-plane: poles and zeros of the controller, the closed-loop root that crosses at the smallest critical perturbation, and the rightmost root. Shaded disc around \u22121 in the Nyquist "
+        element("div", { class: "live-paste" }, paste, understood, around, doubt), element("div", { class: "live-fields" }, inputs, legend(`${PINNED} In the s-plane: poles and `
+          + "zeros of the controller, which you can drag, the closed-loop root that crosses at the smallest critical perturbation, and the rightmost root. Shaded disc around \u22121 in the Nyquist "
           + "plot, and dashed line in Bode\u2019s plot: the bound on |S|."), element("p", {}, orbit)))),
     element("details", {}, element("summary", {}, "This loop in Python"), code));
 
@@ -947,10 +951,10 @@ function armlockPages() {
     today.querySelector("input").step = 1;
     const form = element("form", { class: "live-form live-single", onsubmit: event => event.preventDefault() },
       pick("loop", "Loop", Object.keys(LOOPS)), pick("orbit", "Orbit", Object.keys(armlockOrbits)),
-      pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor assumes", HOLDS));
+      pick("master", "Master spacecraft", Object.keys(ARMS)), pick("hold", "The sensor assumes", HOLDS));
     place.replaceChildren(element("div", { class: "live-own" },
       element("div", { class: "live-main" }, figures(element("figure", {}, element("figcaption", {}, "Solid: the true half "
-        + "difference. Dashed: the half difference that the sensor assumes."), sheet.canvas, lost), live.figure), words, live.note, live.numbers, buttons(back)),
+        + "difference. Dashed: the half difference that the sensor assumes. Shaded: the loop is unstable."), sheet.canvas, lost), live.figure), words, live.note, live.numbers, buttons(back)),
       element("div", { class: "live-side" }, element("div", { class: "live-top" }, form, wrong),
         element("div", { class: "live-panel" }, live.summary, today), element("div", { class: "live-fields" }, legend()))));
     addEventListener("hashchange", () => location.reload());

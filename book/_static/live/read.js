@@ -1024,8 +1024,9 @@ const armlockRead = (function () {
    * `doubt`, what the rounding of its printed digits leaves open. */
   function readController(text) {
     const refuse = (at, found, why) => {
-      throw wrong("pasted", `This text is not understood: ${why} (line ${lineOf(text, at)}, at \u201c${
-        String(found).trim().slice(0, 30)}\u201d).`);
+      // Only what stands in the text is quoted.
+      const word = String(found).trim().slice(0, 30), place = word.startsWith("the end") ? word : `\u201c${word}\u201d`;
+      throw wrong("pasted", `This text is not understood: ${why} (line ${lineOf(text, at)}, at ${place}).`);
     };
     if (!text.trim()) refuse(0, "", "it is empty");
     spent = 0;

@@ -17,7 +17,7 @@ const armlockTable = (function () {
   const UNBROKEN = { size: NaN };
   const MARGINS = ["Delay margin", "Unstable roots", "Phase margin in degrees", "Smallest gain factor of a stable loop",
     "Largest gain factor of a stable loop", "Smallest |1 + L|"];
-  const PANEL = ["Delay margin", "Unstable roots", "Phase margin", "Gain factor from", "to", "Smallest |1 + L|"];
+  const PANEL = ["Delay margin", "Unstable roots", "Phase margin", "Gain factor from", "Factor up to", "Smallest |1 + L|"];
 
   const WAIT = { text: "\u2026", waits: true };
   const plain = (text, short = text) => ({ text, short });
