@@ -71,9 +71,8 @@ def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeRespons
     Returns
     -------
     control.TimeResponseData
-        As from ``control.step_response``: ``response.time``, ``response.outputs``. Overshoot
-        and settling time are in ``control.step_info(response.outputs, response.time,
-        yfinal=system(0.0).real)``.
+        As from ``control.step_response``: ``response.time``, ``response.outputs``. `step_info`
+        has overshoot and settling time.
 
     Raises
     ------
