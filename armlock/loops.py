@@ -269,8 +269,8 @@ class Loop(System):
 
     @cached_property
     def _closed(self) -> dict[str, System]:
-        closed = {source: -path / (1 + self) for source, path in self.paths.items()}
-        return {"laser": 1 / (1 + self), **closed}
+        whole = 1 + self
+        return {"laser": 1 / whole, **{k: -path / whole for k, path in self.paths.items()}}
 
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay) at s in rad/s, any shape."""
