@@ -53,6 +53,13 @@ def _not_kept(reason: Exception) -> None:
 class _Kept(FunctionCache):  # type: ignore[misc]
     """The cache of a function; a full disk ends no call, for which numba has no setting."""
 
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        # Numbers of other modules are literals in compiled code: they are part of its source.
+        given = function.__globals__.items()
+        numbers = [(name, value) for name, value in given if isinstance(value, float | int)]
+        self._cache_file._source_stamp = self._cache_file._source_stamp, numbers
+
     @property
     def exists(self) -> bool:
         """Whether an earlier process has kept something, perhaps of other source."""

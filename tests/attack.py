@@ -40,7 +40,7 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.engine.decide import UNDECIDED
+from armlock.engine.tolerances import UNDECIDED
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.stability.semidiscretization import semi_discretization
 from tests import attack_judge as judge

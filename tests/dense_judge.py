@@ -9,7 +9,7 @@ import numpy as np
 
 from armlock import delay, margins, unstable_roots
 from armlock.engine import decide
-from armlock.engine.chain import UndecidedError
+from armlock.engine.tolerances import UndecidedError
 from tests import attack_judge, independent
 
 NAMES = ("gain_upper", "gain_lower", "phase", "delay", "modulus")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from armlock import BOUNDARY, first_crossing, margins, unstable_roots
-from armlock.engine.inclusion import EPSILON
+from armlock.engine.tolerances import EPSILON
 from tests import attack
 from tests.attack_judge import Sketch
 

@@ -17,10 +17,11 @@ from armlock.engine import decide, inclusion
 
 MODULE = """
 from compiled import njit
+from factor import FACTOR
 
 @njit()
 def times(x):
-    return {} * x
+    return FACTOR * x
 
 @njit()
 def more(x):
@@ -39,7 +40,8 @@ def printed(folder, factor=2, *, full=False, **more):
     limit on the size of files stands for a full disk. The line that compiling prints after a
     second, on a slow machine, is switched off with the progress bars.
     """
-    (folder / "times.py").write_text(MODULE.format(factor), "utf-8")
+    (folder / "times.py").write_text(MODULE, "utf-8")
+    (folder / "factor.py").write_text(f"FACTOR = {factor}\n", "utf-8")
     shutil.copy(compiled.__file__, folder)
     done = subprocess.run(
         [sys.executable, "-B", "-c", full * FULL + "import times"],
@@ -69,8 +71,8 @@ def test_where_nothing_can_be_written_each_process_compiles(tmp_path):
 
 def test_a_full_disk_ends_no_call(tmp_path):
     assert printed(tmp_path) == ("6 4 True\n", "")
-    # The index fits onto the disk, and what has been compiled does not: what was compiled from
-    # the source before stays there.
+    # The index fits onto the disk, and what has been compiled does not: what was compiled with
+    # the other factor stays there.
     out, err = printed(tmp_path, factor=5, full=True)
     assert out == "15 4 False\n"
     assert said_once(err, r"\[Errno 27\] File too large")

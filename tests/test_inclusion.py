@@ -14,8 +14,8 @@ import pytest
 
 from armlock.engine import inclusion
 from armlock.engine.functions import Function, Space, compiled
-from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import Polynomial, exact, of_roots, rounded
+from armlock.engine.tolerances import EPSILON
 from armlock.systems import Lag
 
 mp = mpmath.mp.clone()

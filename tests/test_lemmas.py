@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from armlock.engine import decide, inclusion
-from armlock.engine.decide import UNCONFINED, Family
+from armlock.engine.decide import Family
 from armlock.engine.functions import Space, compiled, stacked
 from armlock.engine.polynomials import Polynomial
+from armlock.engine.tolerances import UNCONFINED
 from tests.test_inclusion import (
     Exact,
     after,

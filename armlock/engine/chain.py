@@ -17,6 +17,7 @@ from flint import fmpq
 
 from armlock.checks import ComplexArray, FloatArray
 from armlock.engine.polynomials import rounded
+from armlock.engine.tolerances import UndecidedError
 
 # On the torus a P that is smaller than this share of its coefficients is zero; and where a
 # candidate is looked for.
@@ -44,10 +45,6 @@ class Product(Protocol):
 
     def __hash__(self) -> int:
         """Hash it."""
-
-
-class UndecidedError(RuntimeError):
-    """Double precision, or the steps allowed, did not decide."""
 
 
 def own_phases(lags: Iterable[Product]) -> tuple[list[Product], list[Product]]:

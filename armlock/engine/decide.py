@@ -2,7 +2,8 @@
 
 `count` follows the argument of one function. `Family` states functions of which none may have
 a zero, up to a level; `least` finds the largest level at which none has. Where double
-precision does not decide, a count is `BOUNDARY`, and a search raises an `UndecidedError`.
+precision does not decide, a count is `BOUNDARY`, and a search raises an `UndecidedError`
+(`armlock.engine.tolerances`).
 """
 
 from __future__ import annotations
@@ -21,21 +22,20 @@ from flint import fmpq
 from armlock.checks import FloatArray, IntArray
 from armlock.compiled import Plain
 from armlock.engine import chain, inclusion
-from armlock.engine.chain import UndecidedError
 from armlock.engine.functions import Function, Leading, Space, compiled, stacked
 from armlock.engine.inclusion import DISTANCE, VERTEX, Functions, Question
 from armlock.engine.polynomials import exact, rounded
+from armlock.engine.tolerances import (
+    BOUNDARY,
+    FEW_UNDECIDED,
+    OFF_A_WHOLE_NUMBER,
+    STEPS_OF_A_COUNT,
+    STEPS_OF_A_SEARCH,
+    UNCONFINED,
+    UNDECIDED,
+    UndecidedError,
+)
 
-#: What a count is where a root lies on the axis, or rounding does not decide on which side.
-BOUNDARY = -1
-#: What a count is where infinitely many roots do not stay left of the axis.
-UNCONFINED = -2
-#: What a count among many is that takes too many steps; alone it raises an `UndecidedError`.
-UNDECIDED = -3
-
-# Most steps of a count, and of a search; up to ten seconds each.
-_MOST_STEPS = 1_500_000
-_MOST_SEARCHED = 2_000_000
 # Steps between two looks at the keyboard.
 _A_WHILE = 100_000
 # Steps in likely intervals before a search.
@@ -78,7 +78,7 @@ def counts(
     functions: Functions,
     *,
     leading: Sequence[Leading | None] | None = None,
-    most: int = _MOST_STEPS,
+    most: int = STEPS_OF_A_COUNT,
 ) -> IntArray:
     """Count the zeros with positive real part of n functions (Lemma 13).
 
@@ -131,7 +131,7 @@ def counts(
     # A map counts zeros in the strip |Im s| < pi / step, at whose right end it is constant.
     number = 0.5 * ((0 if space.step else space.degree) - order[here]) - turn / np.pi
     with np.errstate(invalid="ignore"):
-        sure = np.isnan(undecided) & (np.abs(number - np.round(number)) < 1e-2)
+        sure = np.isnan(undecided) & (np.abs(number - np.round(number)) < OFF_A_WHOLE_NUMBER)
         found[here] = np.where(sure & (number > -0.5), np.round(number), BOUNDARY)
     found[here[steps >= most]] = UNDECIDED
     return found
@@ -164,7 +164,7 @@ def _wound(
 
 
 def count(
-    function: Function, common: int = 0, *, right_of: float = 0.0, most: int = _MOST_STEPS
+    function: Function, common: int = 0, *, right_of: float = 0.0, most: int = STEPS_OF_A_COUNT
 ) -> int:
     """Count the zeros of a function with a real part above a number.
 
@@ -357,7 +357,7 @@ def _searched(
     pending: FloatArray,
     best: float,
     where: float,
-    most: int = _MOST_SEARCHED,
+    most: int = STEPS_OF_A_SEARCH,
 ) -> tuple[float, float, FloatArray]:
     """Walk over intervals, the last first, until none is left, or several are undecided.
 
@@ -369,7 +369,7 @@ def _searched(
         If it takes too many steps.
     """
     steps, undecided = 0, np.zeros((0, 2))
-    while len(pending) and len(undecided) < inclusion.FEW_UNDECIDED:
+    while len(pending) and len(undecided) < FEW_UNDECIDED:
         walk = partial(inclusion.walk, functions, question, pending, best, where)
         [(pending, more, best, where, taken)] = in_threads(walk, [min(_A_WHILE, most)])
         undecided, steps = np.concatenate((undecided, more)), steps + taken
@@ -446,7 +446,7 @@ def least(
 
 
 def excludes(
-    family: Family, begin: float = 0.0, end: float = np.inf, most: int = _MOST_SEARCHED
+    family: Family, begin: float = 0.0, end: float = np.inf, most: int = STEPS_OF_A_SEARCH
 ) -> bool:
     """Tell whether no function of a family has a zero on the axis, but perhaps at s = 0.
 

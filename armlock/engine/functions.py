@@ -22,7 +22,7 @@ from flint import acb, acb_poly, fmpq, fmpq_poly
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray
 from armlock.engine import chain, inclusion
-from armlock.engine.inclusion import EPSILON, Arrays
+from armlock.engine.inclusion import Arrays
 from armlock.engine.polynomials import (
     Polynomial,
     exact,
@@ -31,6 +31,7 @@ from armlock.engine.polynomials import (
     rounded,
     series,
 )
+from armlock.engine.tolerances import CONFINED, CONFINED_TO_THE_END, EPSILON
 
 Exact = npt.NDArray[np.object_]
 # Most coefficients of a series at s = 0 of which one has to differ from zero.
@@ -198,7 +199,7 @@ class Space:
         if self.step:
             return np.ones(len(still), np.bool_)
         sizes = np.abs(still) + np.abs(late).sum(-1)
-        found: BoolArray = chain.reserve(still, late) > 16.0 * EPSILON * sizes
+        found: BoolArray = chain.reserve(still, late) > CONFINED * sizes
         return found
 
     def confined_from(
@@ -244,7 +245,7 @@ class Space:
         if reserve is None:
             reserve = chain.reserve(still, turned)
         with np.errstate(under="ignore"):
-            rounding = 64.0 * EPSILON * ((np.abs(whole) + parts) @ lead)
+            rounding = CONFINED_TO_THE_END * ((np.abs(whole) + parts) @ lead)
         room = reserve - (terms @ lead if top_terms is None else top_terms) - rounding
         found = np.full(len(steady), np.inf)
         left = np.flatnonzero(room > 0.0)

@@ -11,9 +11,10 @@ interval, so that arguments and signs remain.
 
 In order: the enclosure; whether it excludes zero; and the walks along the axis, which halve
 intervals until each is decided. An interval that double precision does not halve any more is
-undecided (`_halve`). All compiled code of the engine is in this module, because numba compiles
-a function again when its own file changes, but not when that of a function it calls does. Pass
-no literal number to a function: numba would compile the function again for this number.
+undecided (`_halve`, and `armlock.engine.tolerances`). All compiled code of the engine is in
+this module, because numba compiles a function again when its own file or a number that it
+imports changes, but not when the file of a function it calls does. Pass no literal number to a
+function: numba would compile the function again for this number.
 """
 
 from __future__ import annotations
@@ -24,8 +25,14 @@ import numpy as np
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
 from armlock.compiled import njit
+from armlock.engine.tolerances import (
+    EPSILON,
+    FEW_UNDECIDED,
+    LOWEST,
+    MANY_UNDECIDED,
+    NARROWEST,
+)
 
-EPSILON = 2.0**-52
 #: Number of Taylor coefficients that are kept.
 ORDER = 4
 # An exponential that turns by more than this, in rad, over half an interval is not resolved.
@@ -39,9 +46,6 @@ _HUGE = 1e150
 # A piece of the axis has this half width over the sum of 1 / distance to a root. It serves
 # intervals down to its length over `_SUBINTERVALS`.
 _PIECE, _SUBINTERVALS = 0.02, 4096.0
-# Undecided intervals after which a search ends; and, of a row on average, after which rows are
-# followed no further. Rounding hides much of the axis where N is nearly a multiple of M.
-FEW_UNDECIDED, _MANY_UNDECIDED = 16, 4096
 # Most steps to a crossing: three for each halving that double precision allows.
 _MOST_LOCATED = 160
 # Room for halves of halves: geometric ones to a few rad/s apart, and 52 more.
@@ -734,7 +738,7 @@ def _halve(stack: FloatArray, top: int, low: float, high: float) -> bool:
     middle = 0.5 * (low + high)
     if high > 4.0 * low:
         middle = np.sqrt(low) * np.sqrt(high) if low > 0.0 else high / 64.0
-    narrow = high - low <= 4.0 * EPSILON * high or high < 1e-290
+    narrow = high - low <= NARROWEST * high or high < LOWEST
     if narrow or not low < middle < high or top + 2 > stack.shape[0]:
         return False
     stack[top, 0], stack[top, 1] = middle, high
@@ -1357,7 +1361,7 @@ def _first_intervals(stack: FloatArray, begin: float, end: float, is_map: bool) 
 def _cut_around(stack: FloatArray, top: int, low: float, m: float, r: float) -> bool:
     """Cut an interval around s = 0 or a map's end: a shorter one, and what lies beside it."""
     q = r / 16.0
-    if q <= 4.0 * EPSILON * m or q < 1e-290:
+    if q <= NARROWEST * m or q < LOWEST:
         return False
     stack[top, 0], stack[top, 1] = (q, r) if low < 0.0 else (low, m - q)
     stack[top + 1, 0], stack[top + 1, 1] = m - q, m + q
@@ -1448,7 +1452,7 @@ def cross(
         top -= 1
         low, high, d = stack[top, 0], stack[top, 1], depth[top]
         here, steps = pool[d, : size[d]], steps + 1
-        if steps > most or undecided >= _MANY_UNDECIDED * number:
+        if steps > most or undecided >= MANY_UNDECIDED * number:
             for row in here:
                 unfinished[row] = True
             continue

@@ -15,7 +15,7 @@ import numpy as np
 from flint import fmpq, fmpq_poly
 
 from armlock.checks import FloatArray
-from armlock.engine.inclusion import EPSILON
+from armlock.engine.tolerances import EPSILON
 
 _Key = TypeVar("_Key")
 _Term = TypeVar("_Term", bound=Any)

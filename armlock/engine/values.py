@@ -23,8 +23,8 @@ from flint import acb, fmpq
 
 from armlock.checks import ComplexArray, FloatArray
 from armlock.engine.functions import Function, Space, limit_at_zero
-from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import rounded
+from armlock.engine.tolerances import EPSILON
 
 # So many values at once stay in a processor's cache, which takes half the time.
 _BLOCK = 1 << 13

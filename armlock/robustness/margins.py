@@ -22,11 +22,16 @@ from flint import fmpq, fmpq_poly
 
 from armlock.checks import positive_number, real_number
 from armlock.engine import chain, decide
-from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import Family, least
 from armlock.engine.functions import Function, common_zeros, keeps_sign_up_to, stacked
-from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL, TERM, VERTEX
+from armlock.engine.inclusion import DELAY, DISTANCE, PHASE, REAL, TERM, VERTEX
 from armlock.engine.polynomials import Polynomial, exact, on_axis, rounded
+from armlock.engine.tolerances import (
+    CONFINED_IN_A_MARGIN,
+    EPSILON,
+    NEXT_TO_THE_LIMIT,
+    UndecidedError,
+)
 from armlock.loops import checked_loop
 from armlock.robustness.many import many
 from armlock.stability.counts import UnstableError, decided, require_stable
@@ -43,10 +48,6 @@ _TRIED = sorted((10.0 ** (k / 4) for k in range(-12, 13)), key=lambda k: max(k, 
 _GAINS, _STEPS_OF_A_PROOF = (1e6, 1e4, 1e2), 200_000
 # So close to the limit of the neutral root chain, as a share, no root is looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
-# And so close to it, as a share, what rounding hides is that limit.
-_DECIDED_SHARE = 1e-6
-# What is left of the undelayed term at high frequency is decided if it is this share of it.
-_DECIDED = 256.0 * EPSILON
 # Largest delay margin in s: beyond it there is none.
 _LARGEST_DELAY = 1e300
 
@@ -478,9 +479,9 @@ def first_zero(
     if limit < most:
         best, where = start + (limit - start) * (1.0 - _NEXT_TO_THE_CHAIN), math.inf
     if high == math.inf:
-        decided = chain_limit(f, g, start, _DECIDED)
+        decided = chain_limit(f, g, start, CONFINED_IN_A_MARGIN)
     if decided < best:
-        best, near = decided, decided >= limit * (1.0 - _DECIDED_SHARE)
+        best, near = decided, decided >= limit * (1.0 - NEXT_TO_THE_LIMIT)
         where = where if near else math.nan
     zero = at_zero(f, g)
     if start < zero < best:
@@ -488,7 +489,7 @@ def first_zero(
     if not g.is_zero:
         hull = [(VERTEX, (1.0, start), (0.0, 0.0)), (VERTEX, (1.0, 0.0), (0.0, 1.0))]
         best, where = least(Family([f, g], [hull]), REAL, best, where, start=start, high=high)
-    if math.isnan(where) and decided < most * (1.0 - _DECIDED_SHARE):
+    if math.isnan(where) and decided < most * (1.0 - NEXT_TO_THE_LIMIT):
         raise UndecidedError(f"rounding hides whether the chain is confined from {decided} on")
     return (limit, where) if where == math.inf else (best, where)
 
@@ -539,7 +540,7 @@ def _limit_of_ratio(d: Function, n: Function) -> tuple[float, float, float]:
     k = int(np.argmin(ratios))
     if not ratios[k] < math.inf:
         return math.inf, math.nan, 0.0
-    decided = 2.0 * _DECIDED * size / abs(above[k]) if ratios[k] else 0.0
+    decided = 2.0 * CONFINED_IN_A_MARGIN * size / abs(above[k]) if ratios[k] else 0.0
     return float(ratios[k]), math.inf, float(decided)
 
 

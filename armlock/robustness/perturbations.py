@@ -23,10 +23,11 @@ from armlock.checks import (
 )
 from armlock.engine import decide
 from armlock.engine.affine import Affine, NotAffineError
-from armlock.engine.decide import BOUNDARY, UNCONFINED, Family
+from armlock.engine.decide import Family
 from armlock.engine.functions import Function, common_zeros
-from armlock.engine.inclusion import EPSILON, TERM, VERTEX
+from armlock.engine.inclusion import TERM, VERTEX
 from armlock.engine.polynomials import collected, exact, polynomial, rounded
+from armlock.engine.tolerances import BOUNDARY, EPSILON, UNCONFINED
 from armlock.loops import Loop, checked_loop
 from armlock.robustness.many import many
 from armlock.robustness.margins import first_zero

@@ -19,7 +19,6 @@ from flint import fmpq, fmpq_poly
 
 from armlock.checks import FloatArray, real_number
 from armlock.engine import chain, decide
-from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import Family
 from armlock.engine.functions import Function, Space, at, common_zeros, stacked
 from armlock.engine.inclusion import VERTEX
@@ -31,6 +30,7 @@ from armlock.engine.polynomials import (
     on_axis,
     polynomial,
 )
+from armlock.engine.tolerances import UndecidedError
 from armlock.loops import checked_loop
 from armlock.robustness.many import many
 from armlock.robustness.margins import decided_ratio, first_zero

@@ -21,10 +21,9 @@ from armlock.checks import BoolArray, FloatArray, IntArray, axis, check_memory, 
 from armlock.compiled import Progress
 from armlock.engine import chain
 from armlock.engine.affine import Affine, NotAffineError
-from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, stacked
-from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import exact, rounded
+from armlock.engine.tolerances import BOUNDARY, EPSILON, HIDDEN_AT_ZERO, UNCONFINED
 from armlock.stability.counts import count_points, unstable_roots
 from armlock.stability.crossings import crossings
 from armlock.systems import System
@@ -404,7 +403,7 @@ class _Rows:
         # Of many fast poles the product is no float.
         sizes = rounded([v / (max(map(abs, self.d)) or 1) for v in self.d])
         sums = np.column_stack((np.ones(x.size), x, y)) * sizes
-        return np.asarray(np.abs(sums.sum(axis=1)) <= 8.0 * EPSILON * np.abs(sums).sum(axis=1))
+        return np.asarray(np.abs(sums.sum(axis=1)) <= HIDDEN_AT_ZERO * np.abs(sums).sum(axis=1))
 
     def confined_from(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Frequency past which the constant exceeds x first and y second together."""

@@ -26,10 +26,9 @@ from armlock.checks import (
 )
 from armlock.engine import decide
 from armlock.engine.affine import Affine, NotAffineError, present
-from armlock.engine.chain import UndecidedError
-from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
 from armlock.engine.functions import Function, check_sizes, common_zeros, stacked
-from armlock.engine.inclusion import EPSILON, Functions
+from armlock.engine.inclusion import Functions
+from armlock.engine.tolerances import BOUNDARY, EPSILON, UNCONFINED, UNDECIDED, UndecidedError
 from armlock.systems import System
 
 __all__ = ["BOUNDARY", "UNCONFINED", "UNDECIDED", "CountError", "unstable_roots"]
@@ -273,8 +272,8 @@ def require_stable(
     count = decide.count(d, common)
     if count != 0:
         reasons = {
-            decide.BOUNDARY: f"a {zero} on the imaginary axis",
-            decide.UNCONFINED: "no confined chain: small delay changes may make it unstable",
+            BOUNDARY: f"a {zero} on the imaginary axis",
+            UNCONFINED: "no confined chain: small delay changes may make it unstable",
             1: f"1 unstable {zero}",
         }
         found = reasons.get(count, f"{count} unstable {zero}s")

@@ -12,9 +12,7 @@ from armlock.checks import BoolArray, FloatArray, IntArray
 from armlock.engine import inclusion
 from armlock.engine.decide import blocks, in_threads
 from armlock.engine.functions import Function, compiled
-
-# Most steps for some rows: some ten seconds.
-_MOST_STEPS = 3_000_000
+from armlock.engine.tolerances import STEPS_OF_ROWS
 
 
 class Crossings(NamedTuple):
@@ -78,7 +76,9 @@ def crossings(
         last = float(end[k].max())
         is_map = bool(step) and last >= np.pi / step
         rows = inclusion.Rows(y[k], lower[k], upper[k])
-        table, unfinished = inclusion.cross(three, rows, begin, last, is_map, fine, _MOST_STEPS)
+        table, unfinished = inclusion.cross(
+            three, rows, begin, last, is_map, fine, STEPS_OF_ROWS
+        )
         table[:, 0] += k.start
         return table, unfinished
 

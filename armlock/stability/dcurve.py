@@ -17,8 +17,8 @@ from flint import fmpq, fmpq_poly
 from armlock.checks import FloatArray, check_memory, positive_number, real_array
 from armlock.engine.affine import Affine, functions
 from armlock.engine.functions import at
-from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import collected, polynomial, rounded
+from armlock.engine.tolerances import EPSILON, HIDDEN_POLE
 from armlock.stability.counts import CountError
 from armlock.stability.crossings import crossings
 from armlock.systems import Lag, Sum, System
@@ -128,7 +128,7 @@ class _Curve:
             # What the frequency is rounded by hides the determinant next to its zeros.
             near = np.abs(determinant) < 1e-6 * np.abs(b * c / one**2)
             value, slope = self.functions[5].value_and_slope(1j * omega[near])
-            hidden = np.abs(value) <= 4.0 * EPSILON * np.abs(omega[near] * slope)
+            hidden = np.abs(value) <= HIDDEN_POLE * np.abs(omega[near] * slope)
             determinant[near] = np.where(hidden, np.nan, determinant[near])
             x = self.affine.origin[0] - (known * np.conj(c / one)).imag / determinant
             y = self.affine.origin[1] + (known * np.conj(b / one)).imag / determinant

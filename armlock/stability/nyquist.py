@@ -24,8 +24,8 @@ from armlock.engine.functions import (
     keeps_sign_up_to,
     stacked,
 )
-from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import rounded
+from armlock.engine.tolerances import EPSILON
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided, place
 from armlock.stability.crossings import crossings
 from armlock.systems import System

@@ -20,10 +20,9 @@ from flint import acb, acb_poly, arb, fmpq_poly
 
 from armlock.checks import ComplexArray, FloatArray, real_number, whole_steps
 from armlock.engine import chain, decide, inclusion
-from armlock.engine.chain import UndecidedError
-from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, Space, common_zeros
 from armlock.engine.polynomials import enclosed_roots, order
+from armlock.engine.tolerances import BOUNDARY, UNCONFINED, UndecidedError
 from armlock.stability.counts import CountError, at_points, count_exactly, decided, place
 from armlock.systems import System
 

@@ -29,7 +29,7 @@ import numpy.typing as npt
 from numpy.polynomial import legendre
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray
-from armlock.engine.inclusion import EPSILON
+from armlock.engine.tolerances import EPSILON
 
 # Points of a panel, and the most panels: a minute for a thousand times.
 _POINTS, _MOST = 20, 1 << 16

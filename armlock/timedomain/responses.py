@@ -22,8 +22,8 @@ from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpq_poly
 from armlock.checks import ComplexArray, FloatArray, finite_series, positive_number
 from armlock.engine.decide import count
 from armlock.engine.functions import common_zeros
-from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import collected, enclosed_roots, exact, polynomial
+from armlock.engine.tolerances import EPSILON
 from armlock.engine.values import turned
 from armlock.stability.counts import decided, require_stable
 from armlock.systems import Delay, Lag, Sum, System
