@@ -152,6 +152,7 @@ class Loop(System):
         mapping: SignalMapping | str,
         tau1: float,
         tau2: float | None = None,
+        *,
         delay: float = 0.0,
     ) -> None:
         k = System.of(controller, "controller")
@@ -522,7 +523,7 @@ def paper_loop(
     if true_or_false("actuator", actuator):
         chosen = chosen * integrating_actuator()
     mapping = sensors.dual(corner, tau1 - tau2 if difference is None else difference)
-    return Loop(chosen, mapping, tau1, tau2, delay)
+    return Loop(chosen, mapping, tau1, tau2, delay=delay)
 
 
 def flight_loop(
@@ -530,6 +531,7 @@ def flight_loop(
     half_difference: float = 0.255,
     g2: float = 40.0,
     corner: float = paper.DUAL_SENSOR_CORNER,
+    *,
     delay: float = 0.0,
 ) -> Loop:
     r"""Return the loop of the LISA Frequency Control White Paper, arm 1 the longer.
@@ -585,7 +587,8 @@ def flight_loop(
             f"half_difference must be below mean_delay ({mean_delay}), got {half_difference}"
         )
     tau1, tau2 = mean_delay + half_difference, mean_delay - half_difference
-    return Loop(white_paper(0.5 * positive_number("g2", g2)), mapping, tau1, tau2, delay)
+    controller = white_paper(0.5 * positive_number("g2", g2))
+    return Loop(controller, mapping, tau1, tau2, delay=delay)
 
 
 def _at_hertz(*corners: float) -> list[float]:

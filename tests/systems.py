@@ -79,7 +79,7 @@ NEUTRAL = {
     "third order, unstable A": two_delays(
         with_roots(0.3, -1.0, -1.0), [1.0, 0.0, 0.0, 0.5], [0.0, 1.0, 0.0, 0.5], 0.8, 1.5
     ),
-    "dead time": Loop(Controller([-0.3], [0.2], 0.2), COMMON, 2.0, 1.5, 0.6),
+    "dead time": Loop(Controller([-0.3], [0.2], 0.2), COMMON, 2.0, 1.5, delay=0.6),
 }
 
 

@@ -45,7 +45,7 @@ def drawn(rng):
         poles[0] = 0.0
     controller = Controller(zeros, poles, 10 ** rng.uniform(-1, 1.7))
     delay = rng.choice([0.0, mean * 10 ** rng.uniform(-4, -1)])
-    return Loop(controller, sensors[rng.integers(3)], mean + held, mean - held, delay)
+    return Loop(controller, sensors[rng.integers(3)], mean + held, mean - held, delay=delay)
 
 
 def test_a_range_is_stable_at_random_differences_and_ends_where_a_root_crosses():

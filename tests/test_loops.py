@@ -76,7 +76,7 @@ K = ((-0.02,), (0.0, -0.1), 1.0)
 def test_a_loop_of_ones_own_as_one_guesses_it():
     """Sensors by name, and no tau2 without an arm 2."""
     pairs = [
-        (Loop(K, "single", 20.0, delay=20e-6), Loop(K, SINGLE, 20.0, 20.0, 20e-6)),
+        (Loop(K, "single", 20.0, delay=20e-6), Loop(K, SINGLE, 20.0, 20.0, delay=20e-6)),
         (SingleArm(tau1=20.0).replace(tau1=19.0), Loop(((), (0.0,), 1.0), SINGLE, 19.0)),
         (Loop(K, "common", 20.1, 19.9), Loop(K, COMMON, 20.1, 19.9)),
         (Loop(K, "dual", 20.1, 19.9), Loop(K, dual(DUAL_SENSOR_CORNER, 0.2), 20.1, 19.9)),
@@ -126,6 +126,8 @@ def test_what_is_missing_is_named():
         Loop(K, 20.0, 20.0)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"^tau2 must be given: the signal mapping 'common'"):
         Loop(K, "common", tau1=20.0)
+    with pytest.raises(TypeError, match=r"positional arguments but 6 were given"):
+        Loop(K, "common", 16.7, 16.5, 16.1)  # type: ignore[call-arg]
     with pytest.raises(ValueError, match=r"^mapping must be .* 'modified dual'; got 'triple'"):
         Loop(K, "triple", tau1=20.0)
     assert np.isinf(DualArm()([1j, 0.0])).tolist() == [False, True]

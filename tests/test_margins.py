@@ -70,7 +70,7 @@ STABLE = {
     "neutral, opposed": (Loop(((-3.0,), (-1.0,), 0.2), DIFFERENCE, 2.0, 1.5), (0.9, 1.0)),
     # L is the limit of a quotient whose denominator does not begin with one.
     "neutral, dual arm": (
-        Loop(((-1.0,), (-2.0,), 0.2), dual(3.0, 0.5), 2.0, 1.5, 0.1),
+        Loop(((-1.0,), (-2.0,), 0.2), dual(3.0, 0.5), 2.0, 1.5, delay=0.1),
         (0.9, 1.0),
     ),
     "without dynamics": (Loop(((), (), 0.3), SINGLE, 2.0, 1.5), (1.5, 1.0)),
