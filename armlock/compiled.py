@@ -19,34 +19,32 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from functools import cached_property
-from threading import Timer
+from functools import cache, cached_property
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numba
 import numpy as np
 from numba.core.caching import FunctionCache
-from numba.core.event import Listener, register
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-# After so many seconds compiling says that it does, and work shows its progress.
-_PATIENCE, _PATIENCE_OF_WORK = 1.0, 2.0
+
+@cache
+def _compiling() -> None:
+    """Say, once in a process, what takes so long."""
+    # Where progress bars are off, as in the book's notebooks, the line is no part of a page.
+    if not os.environ.get("TQDM_DISABLE"):
+        print("armlock: compiling, once for this installation ...", file=sys.stderr)
 
 
-_lost: list[Exception] = []
-
-
-def _not_kept(reason: Exception) -> None:
-    """Say once that nothing is kept."""
-    _lost.append(reason)
-    if len(_lost) > 1:
-        return
+@cache
+def _not_kept() -> None:
+    """Say, once in a process, that the next one compiles again."""
     warnings.warn(
-        "compiled functions are not kept for the next process, which will take as long to "
-        f"compile them: {reason}",
+        "compiled functions are not kept, so that the next process compiles them again: "
+        "NUMBA_CACHE_DIR may name a folder that can be written",
         RuntimeWarning,
-        stacklevel=3,
+        stacklevel=2,
     )
 
 
@@ -65,69 +63,36 @@ class _Kept(FunctionCache):  # type: ignore[misc]
         """Whether an earlier process has kept something, perhaps of other source."""
         return os.path.exists(self._cache_file._index_path)
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what has been kept, or None and say that it is compiled now."""
+        found = super().load_overload(sig, target_context)
+        if found is None:
+            _compiling()
+        return found
+
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what has been compiled, or say that it is not kept."""
         try:
             super().save_overload(sig, data)
-        except OSError as error:
+        except OSError:
             # The index may already name a file that was compiled from other source.
             with contextlib.suppress(OSError):
                 os.unlink(self._cache_file._index_path)
-            _not_kept(error)
-
-
-class _Notice(Listener):  # type: ignore[misc]
-    """A line that says, once in a process, what takes so long while numba compiles."""
-
-    depth, said, begun, seconds = 0, False, 0.0, 0.0
-
-    def on_start(self, event: Any) -> None:
-        """Begin to wait with the first function; others are compiled on its way."""
-        self.depth += 1
-        if self.depth == 1:
-            self.begun = time.monotonic()
-            self.timer = Timer(_PATIENCE, self.say)
-            self.timer.daemon = True
-            self.timer.start()
-
-    def on_end(self, event: Any) -> None:
-        """Wait no longer."""
-        self.depth -= 1
-        if self.depth == 0:
-            self.timer.cancel()
-            self.seconds += time.monotonic() - self.begun
-
-    def taken(self) -> float:
-        """Return the seconds of compiling since this was asked last."""
-        found, self.seconds = self.seconds, 0.0
-        return found
-
-    def say(self) -> None:
-        """Print the line."""
-        # Where progress bars are off, as in the book's notebooks, it is no part of a page.
-        if not (self.said or os.environ.get("TQDM_DISABLE")):
-            self.said = True
-            tqdm.write("armlock: compiling, once for this installation ...", file=sys.stderr)
-
-
-notice = _Notice()
-register("numba:compile", notice)
+            _not_kept()
 
 
 class Progress(tqdm):  # type: ignore[misc]
-    """A progress bar that shows after two seconds of work; compiling is none."""
+    """A progress bar, whose clock starts with the first work done: compiling comes before."""
 
     def __init__(self, total: int, what: str, unit: str) -> None:
-        notice.taken()
         super().__init__(
-            total=total, desc=what, unit=unit, delay=_PATIENCE_OF_WORK, leave=False,
-            smoothing=0.0,
-        )  # fmt: skip
+            total=total, desc=what, unit=unit, delay=2.0, leave=False, smoothing=0.0
+        )
 
     def update(self, n: float = 1) -> Any:
         """Count work that is done."""
-        if not self.disable:
-            self.start_t += notice.taken()
+        if not (self.n or self.disable):
+            self.start_t, self.initial = time.time(), n
         return super().update(n)
 
 
@@ -179,20 +144,16 @@ class Plain:
 
 def njit(
     *,
-    nogil: bool = False,
-    error_model: str = "python",
     inner: bool = False,
     inlined: bool = False,
     allocates: bool = True,
 ) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function when it is first called with arguments of these types.
 
+    Other threads run while the function does. A division by zero gives inf or nan.
+
     Parameters
     ----------
-    nogil : bool, optional
-        Whether other threads run while the function does.
-    error_model : str, optional
-        What a division by zero does: it raises, or with "numpy" gives inf or nan.
     inner : bool, optional
         Whether only compiled functions call it. Then it compiles in less time.
     inlined : bool, optional
@@ -208,8 +169,8 @@ def njit(
         The decorator.
     """
     options = {
-        "nogil": nogil,
-        "error_model": error_model,
+        "nogil": True,
+        "error_model": "numpy",
         "no_cfunc_wrapper": True,
         "no_cpython_wrapper": inner,
         "inline": "always" if inlined else "never",
@@ -220,8 +181,8 @@ def njit(
         dispatcher = numba.njit(**options)(function)
         try:
             dispatcher._cache = _Kept(function)
-        except RuntimeError as error:
-            _not_kept(error)
+        except RuntimeError:
+            _not_kept()
         return dispatcher
 
     return decorate

@@ -57,10 +57,10 @@ DISTANCE, PHASE, DELAY, REAL = range(4)
 
 # Entries are called from Python. Of what they call, `_maker` makes or returns arrays, `_inner`
 # does not, and `_inlined` is a step of one or two others.
-_entry = njit(nogil=True, error_model="numpy")
-_maker = njit(nogil=True, error_model="numpy", inner=True)
-_inner = njit(nogil=True, error_model="numpy", inner=True, allocates=False)
-_inlined = njit(nogil=True, error_model="numpy", inner=True, allocates=False, inlined=True)
+_entry = njit()
+_maker = njit(inner=True)
+_inner = njit(inner=True, allocates=False)
+_inlined = njit(inner=True, allocates=False, inlined=True)
 
 
 # ------------------------------------------------------------------------------ the enclosure

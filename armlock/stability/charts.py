@@ -8,7 +8,6 @@ not add up, and small charts are counted one by one.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -42,9 +41,8 @@ _BYTES_A_POINT = 32
 # How exact a crossing has to be, in steps of the axis.
 _FINE = 1e-4
 # Charts of so many points are counted point by point. Others are filled by so many rows at
-# first, and then by as many as have this many crossings, or points; points are counted in
-# batches, of this size at first.
-_FEW, _ROWS, _MANY_CROSSINGS, _MANY_POINTS, _BATCH = 1024, 8, 2_000_000, 1_000_000, 1 << 9
+# first, and then by as many as have this many crossings, or points.
+_FEW, _ROWS, _MANY_CROSSINGS, _MANY_POINTS = 1024, 8, 2_000_000, 1_000_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -225,19 +223,9 @@ def _by_rows(
     return np.array(rows)
 
 
-def _counted(
-    affine: Affine, x: FloatArray, y: FloatArray, progress: Progress | None = None
-) -> IntArray:
+def _counted(affine: Affine, x: FloatArray, y: FloatArray) -> IntArray:
     """Count at points one by one."""
-    found, start, size = np.empty(x.size, np.int64), 0, _BATCH
-    while start < x.size:
-        some, begun = slice(start, start + size), time.monotonic()
-        found[some] = count_points(affine, np.column_stack((x[some], y[some])))
-        if progress:
-            progress.update(found[some].size)
-        start += size
-        size = size * 8 if time.monotonic() - begun < 0.2 else size
-    return found
+    return count_points(affine, np.column_stack((x, y)))
 
 
 def _chart(affine: Affine, x: FloatArray, y: FloatArray) -> IntArray:
@@ -246,7 +234,11 @@ def _chart(affine: Affine, x: FloatArray, y: FloatArray) -> IntArray:
         rows = _Rows.of(affine, float(x[x.size // 2]), float(y[y.size // 2]))
         if x.size * y.size <= _FEW or not rows.plain:
             across, up = _points(x, y)
-            return _counted(affine, across, up, progress).reshape(y.size, x.size)
+            found = np.empty(across.size, np.int64)
+            for k in (slice(at, at + _FEW) for at in range(0, across.size, _FEW)):
+                found[k] = _counted(affine, across[k], up[k])
+                progress.update(found[k].size)
+            return found.reshape(y.size, x.size)
         return _filled(affine, rows, x, y, progress)
 
 
@@ -276,9 +268,9 @@ def _filled(
             some[~confined], doubtful = UNCONFINED, doubtful & confined
         # Few entries are found many times as fast in a flat array.
         row, column = np.divmod(np.flatnonzero(doubtful), x.size)
-        some[row, column] = _counted(affine, x[column], y[k][row], progress)
+        some[row, column] = _counted(affine, x[column], y[k][row])
         found[k] = some
-        progress.update(some.size - row.size)
+        progress.update(some.size)
         start += number
         number = max(_ROWS, int(number * min(_MANY_CROSSINGS / max(size, 1), 64.0)))
         number = min(number, max(_MANY_POINTS // x.size, 1))

@@ -221,7 +221,7 @@ class ShapedNoise(Shown):
         return (self.draw(min(size, samples - at)) for at in range(0, samples, size))
 
 
-@njit(nogil=True)
+@njit()
 def _shape(series: FloatArray, gain: float, sections: Rows, state: FloatArray) -> None:
     """Replace a series by its filtered self."""
     for i in range(series.size):

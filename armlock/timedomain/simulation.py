@@ -90,7 +90,7 @@ def _delayed(phi: FloatArray, now: int, weights: Weights, i: int) -> float:
     return float(value)
 
 
-@njit(nogil=True)
+@njit()
 def _compute(
     phi: FloatArray,
     inputs: tuple[FloatArray, ...],
