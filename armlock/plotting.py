@@ -22,9 +22,9 @@ from scipy import ndimage
 
 from armlock.checks import ComplexArray, FloatArray
 
-#: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito). The colour
-#: cycle of armlock.mplstyle has the same.
-BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
+#: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito): the first
+#: ones of the colour cycle in armlock.mplstyle.
+BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
 #: Fill of the stable region.
 STABLE = "#B8C4CE"
 # A count is written into a region whose deepest point is at least so far from its edges, as a

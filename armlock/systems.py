@@ -607,7 +607,8 @@ class System:
         found, values = dict(self.nominal), tuple(values)
         if len(values) > len(found):
             raise TypeError(
-                f"{len(values)} values are given for the parameters {self.parameters}"
+                f"{len(values)} values are given for the parameters {self.parameters}; what is "
+                f"no parameter is given by name"
             )
         self.check_names("a keyword", numbers)
         for name, value in [*zip(found, values, strict=False), *numbers.items()]:
