@@ -67,11 +67,10 @@ class Many(Shown):
         return found
 
     def _table(self) -> Table:
-        """Show how many results there are, the first one, and a reason."""
-        found = [one for one in self.results.flat if not isinstance(one, Exception)]
-        rows = [("results", f"{len(found)} of {self.results.size}")]
-        rows += [("first", line) for line in repr(found[0]).splitlines()] if found else []
-        rows += [("no result", reason[:80]) for reason in self.reasons.flat if reason][:1]
+        """Show how many results there are, and why the first one is missing."""
+        missing = [reason for reason in self.reasons.flat if reason]
+        rows = [("results", f"{self.results.size - len(missing)} of {self.results.size}")]
+        rows += [("no result", reason[:80]) for reason in missing[:1]]
         return Table("Many loops or points", rows)
 
 

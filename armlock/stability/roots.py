@@ -25,6 +25,8 @@ from armlock.engine.polynomials import enclosed_roots, order
 from armlock.engine.tolerances import BOUNDARY, UNCONFINED, UndecidedError
 from armlock.stability.counts import CountError, at_points, count_exactly, decided, place
 from armlock.systems import System
+from armlock.tables import Shown, Table
+from armlock.tables import number as shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -556,9 +558,9 @@ def _searched(function: Function, common: int) -> complex:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class CharacteristicRoots:
-    """All characteristic roots right of a line; `print` writes them as a table.
+@dataclass(frozen=True, eq=False, repr=False)
+class CharacteristicRoots(Shown):
+    """All characteristic roots right of a line.
 
     Attributes
     ----------
@@ -601,16 +603,14 @@ class CharacteristicRoots:
         with np.errstate(divide="ignore"):
             return np.asarray(-1.0 / self.values.real)
 
-    def __str__(self) -> str:
-        """List real part, frequency, damping ratio and time constant, pairs once."""
-        lines = [f"{len(self)} roots right of Re s = {self.right_of:g} rad/s"]
-        lines.append("  real part    frequency  damping  time constant")
-        lines.append("      rad/s        rad/s                       s")
-        rows = zip(self.values, self.damping, self.time_constant, strict=True)
-        for s, damping, time in rows:
+    def _table(self) -> Table:
+        """Show real part, frequency, damping ratio and time constant, pairs once."""
+        rows = [("real part", "frequency", "damping", "time constant")]
+        for s, damping, time in zip(self.values, self.damping, self.time_constant, strict=True):
             if s.imag >= 0.0:
-                lines.append(f"{s.real:11.4e}  {s.imag:11.4e}  {damping:7.4f}  {time:13.4e}")
-        return "\n".join(lines)
+                real, omega = shown(s.real, "rad/s"), shown(s.imag, "rad/s")
+                rows.append((real, omega, shown(damping), shown(time, "s")))
+        return Table(f"{len(self)} roots right of Re s = {self.right_of:g} rad/s", rows)
 
     def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
         """Draw the roots, the line, and the region right of it, in which there are no others.
