@@ -50,6 +50,7 @@ FAULTS = {
 @needs_chromium
 def test_it_finds_each_fault_and_none_on_a_good_page(tmp_path, monkeypatch):
     monkeypatch.setattr(check_browser, "POKES", 5)
+    monkeypatch.setattr(check_browser, "PATIENCE", 0.5)
     (tmp_path / "good.html").write_text(PAGE.format(GOOD))
     (tmp_path / "bad.html").write_text(PAGE.format("\n".join(FAULTS)))
     found = check_browser.check(tmp_path, check_browser.pages(tmp_path), search=False)

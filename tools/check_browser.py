@@ -19,7 +19,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -42,6 +42,8 @@ WORD = "delay"
 AXE = {"resultTypes": ["violations"], "preload": False}
 # An element that should react is poked at so many places, at most.
 POKES = 39
+# So many seconds a page has to typeset formulas and to compute, on a machine that is busy.
+PATIENCE = 10.0
 
 # What a reader sees outside code and typeset formulas, and what TeX or MyST left in it.
 RAW = r"""() => {
@@ -164,20 +166,26 @@ class Book:
     def check(self, file: Path) -> None:
         """Do all checks of one page."""
         self.open(file)
-        for problem in self.page.evaluate(RAW):
-            self.report(problem)
+        self.report_lasting(lambda: self.page.evaluate(RAW))
         self.check_interaction()
-        self.check_axe("light")
+        self.report_lasting(lambda: self.by_axe("light"))
         self.page.evaluate("() => { document.documentElement.dataset.theme = 'dark' }")
-        self.page.wait_for_timeout(50)
-        self.check_axe("dark")
+        self.report_lasting(lambda: self.by_axe("dark"))
         for size in (WIDE, MIDDLE, NARROW, NARROWEST):
             self.page.set_viewport_size(size)
-            self.page.wait_for_timeout(50)
-            for problem in [*self.page.evaluate(SIDEWAYS), *self.page.evaluate(CUT)]:
-                self.report(problem)
+            self.report_lasting(
+                lambda: [*self.page.evaluate(SIDEWAYS), *self.page.evaluate(CUT)]
+            )
         self.page.set_viewport_size(WIDE)
         self.check_requests()
+
+    def report_lasting(self, find: Callable[[], list[str]]) -> None:
+        """Note what is still found when the page has had its time."""
+        end = time.monotonic() + PATIENCE
+        while (found := find()) and time.monotonic() < end:
+            self.page.wait_for_timeout(100)
+        for problem in found:
+            self.report(problem)
 
     def check_requests(self) -> None:
         """See that everything came from disk."""
@@ -185,13 +193,15 @@ class Book:
             if urlsplit(url).scheme not in {"file", "data", "blob", "about"}:
                 self.report(f"asks the network for {url}")
 
-    def check_axe(self, mode: str) -> None:
-        """Run axe, and note what it finds."""
-        found = self.axe.run(self.page, options=AXE).response
-        for finding in found["violations"]:
+    def by_axe(self, mode: str) -> list[str]:
+        """Return what axe finds."""
+        self.page.wait_for_timeout(50)  # until the colours are those of the mode
+        found = []
+        for finding in self.axe.run(self.page, options=AXE).response["violations"]:
             targets = [str(node["target"][0]) for node in finding["nodes"]]
             where = ", ".join(targets[:3]) + (" ..." if len(targets) > 3 else "")
-            self.report(f"axe, {mode}: {finding['help']} ({len(targets)}: {where})")
+            found.append(f"axe, {mode}: {finding['help']} ({len(targets)}: {where})")
+        return found
 
     def check_interaction(self) -> None:
         """Move the pointer over what reacts to it, and sliders."""
@@ -200,18 +210,19 @@ class Book:
             if not self.reacts(element):
                 self.report("an element that should react to the pointer does not")
         for slider in page.locator("main input[type=range]").all():
-            slider.scroll_into_view_if_needed()
-            slider.focus()
-            before = slider.evaluate(CONTROLLED)
-            key = (
-                "ArrowRight"
-                if slider.evaluate("s => Number(s.value) < Number(s.max)")
-                else "ArrowLeft"
-            )
-            slider.press(key)
-            page.wait_for_timeout(100)
-            if before is None or slider.evaluate(CONTROLLED) == before:
-                self.report(f"a slider changes nothing: {slider.get_attribute('id')}")
+            self.check_slider(slider)
+
+    def check_slider(self, slider: Any) -> None:
+        """Press an arrow key, and wait for what it changes."""
+        slider.scroll_into_view_if_needed()
+        slider.focus()
+        before = slider.evaluate(CONTROLLED)
+        up = slider.evaluate("s => Number(s.value) < Number(s.max)")
+        slider.press("ArrowRight" if up else "ArrowLeft")
+        problem = [f"a slider changes nothing: {slider.get_attribute('id')}"]
+        self.report_lasting(
+            lambda: problem if slider.evaluate(CONTROLLED) in (None, before) else []
+        )
 
     def reacts(self, element: Any) -> bool:
         """Point at places all over an element until its text changes."""
