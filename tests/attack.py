@@ -9,13 +9,14 @@ decades, lightly damped pairs far above the delays' frequencies, unstable ones, 
 sensor; equal, nearly equal and commensurate delays; c from 1e-6 to 3, at and around (1, 1);
 dead times. Clusters are 2 to 8 modes, spaced by 1e-3 to 1e-1, of a Q from 10 to 1e5; zero is
 the family of points next to zero parameters. `tests.attack_judge` says what is right. Loops
-with three to six delays are drawn and judged by `tests.dense_judge`. Refusals are counted: at
+with three to six delays are drawn and judged by `tests.dense`. Refusals are counted: at
 most one in a hundred, within clusters one in five, none later than 5 s.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import signal
 import sys
 import time
@@ -40,25 +41,27 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
+from armlock.engine import tolerances
+from armlock.engine.decide import Family, excludes
 from armlock.engine.tolerances import UNDECIDED
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.stability.semidiscretization import semi_discretization
 from tests import attack_judge as judge
-from tests import dense_judge, independent
+from tests import dense, independent
 from tests.attack_judge import Sketch, UndecidedError, View
 
 #: What a number may be off, relative.
 EXACT = 1e-5
 #: A refusal later than this, or an answer later than twice this, is a finding, in s.
 LATEST = 5.0
+NAMES = ("gain_upper", "gain_lower", "phase", "delay", "modulus")
 REFUSALS = CountError, RootError, ValueError, ArithmeticError, TimeoutError, SystemError
 
 
 def to_loop(sketch):
     """The armlock loop of a sketch, or of the terms of its numerator and denominator."""
     if isinstance(sketch, tuple):
-        above, below = map(dense_judge.system, sketch)
-        return above / below
+        return dense.quotient(*sketch)
     mapping = {"single": SINGLE, "common": COMMON, "difference": DIFFERENCE}.get(sketch.sensor)
     if mapping is None:
         mapping = dual(sketch.corner, sketch.difference)
@@ -265,7 +268,7 @@ FAMILIES = {
     "mixed": (draw, draw, draw, draw, draw_paper, draw_arm),
     "clusters": (draw_cluster,),
     "zero": (draw_near_zero,),
-    "delays": (lambda rng: (dense_judge.drawn(rng), None),),
+    "delays": (lambda rng: (dense.drawn(rng), None),),
 }
 #: How many refusals among its calls are too many.
 REFUSED = {"mixed": 1e-2, "clusters": 0.2, "zero": 1e-2, "delays": 1e-2}
@@ -602,6 +605,72 @@ def check_maps(tally, rng, sketch, loop, point):
                 tally.note(name, (step, order, x[k], y[k]), int(count), expected)
 
 
+def compared(n, d, ask, controls):
+    """Compare N / D with dense grids; return count and what differs. `ask` calls armlock."""
+    loop, whole = dense.quotient(n, d), dense.plus(n, d)
+    found = ask("unstable_roots", unstable_roots, loop)
+    if found is None:
+        return -1, []
+    try:
+        expected = dense.count(whole)
+    except dense.UndecidedError:
+        expected = -2
+    if found or found != expected:
+        return found, [] if found == expected else [f"count {found} for {expected}"]
+    certified = ask("margins", margins, loop)
+    if certified is None:
+        return found, []
+    wrong = []
+    for name, b in zip(NAMES, dense.margins(n, d), strict=True):
+        a = getattr(certified, name)
+        # Gain factors are looked at from 1e-4 to 1e4.
+        if name.startswith("gain"):
+            a = np.inf if a >= 1e4 else 0.0 if a <= 1e-4 else a
+        too_good = a > b * (1 + 2e-6) if name != "gain_lower" else a < b * (1 - 2e-6)
+        if too_good or not (a == b or math.isclose(a, b, rel_tol=1e-5)):
+            wrong.append(f"{name} {a} for {b}")
+    return found, wrong + too_good_ones(*loop.affine.quotient(), certified, controls)
+
+
+def is_certified(n, m, name, level):
+    """Whether the engine certifies that no less than this level makes N / M marginal."""
+    one, other, none, arc = (1.0, 0.0), (0.0, 1.0), (0.0, 0.0), None
+    tests = [[(1, one, none), (2, other, none)], [(2, one, none), (1, other, none)]]
+    if name == "modulus":
+        n, tests = n + m, [[(1, one, none), (2, (0.0, level), none)]]
+    elif name in ("gain_upper", "gain_lower"):
+        n, m, end = (m, n, level) if name == "gain_upper" else (n, m, 1.0 / level)
+        tests = [[(1, (1.0, 1.0), none), (1, (1.0, end), none)]]
+    else:
+        turns = {"phase": (-level, 0.0, level, 0.0), "delay": (0.0, 0.0, 0.0, level)}
+        arc = turns[name], (0.0, 0.0, 0.0, 0.0)
+    try:
+        return excludes(Family([n, m], tests, arc))
+    except tolerances.UndecidedError:
+        return False
+
+
+def too_good_ones(n, m, found, tally):
+    """Margins that would be certified although they are better than the true ones by 1e-5.
+
+    How many are not, and how many are that are 3e-5 worse, is counted.
+    """
+    wrong = []
+    for name in NAMES:
+        level, way = getattr(found, name), -1.0 if name == "gain_lower" else 1.0
+        if not 0.0 < level < np.inf:
+            continue
+        if name.startswith("gain") and not 1e-4 < level < 1e4:
+            # It may be the largest factor that was looked at, and no margin.
+            continue
+        for what, share in (("too good", 1e-5), ("too small", -3e-5)):
+            certified = is_certified(n, m, name, level * (1.0 + way * share))
+            tally[f"{what}: {'' if certified else 'not '}certified"] += 1
+            if certified and what == "too good":
+                wrong.append(f"{name} too good")
+    return wrong
+
+
 def check_controls(tally, rng, sketch, loop, point):
     """No margin that is 1e-5 too good is certified; nearly all that are 3e-5 worse are."""
     if judge.count(sketch, *point) != 0:
@@ -610,13 +679,13 @@ def check_controls(tally, rng, sketch, loop, point):
     if found is None:
         return
     quotient = loop.affine.quotient(*point)
-    for what in dense_judge.too_good_ones(*quotient, found, tally.controls):
+    for what in too_good_ones(*quotient, found, tally.controls):
         tally.note("controls", point, what, "no certificate")
 
 
 def check_delays(tally, rng, sketch, loop, point):
     """Three to six delays: counts, margins and the rightmost root."""
-    count, wrong = dense_judge.compared(*sketch, tally.ask, tally.controls)
+    count, wrong = compared(*sketch, tally.ask, tally.controls)
     for what in wrong:
         tally.note("delays", point, what, "the judge's")
     root = None if count == -2 else tally.ask("rightmost_root", rightmost_root, loop)
@@ -624,7 +693,7 @@ def check_delays(tally, rng, sketch, loop, point):
         return
     near = 1e-6 * (1.0 + abs(root))
     right, left = (
-        dense_judge.Judge(*(dense_judge.shifted(terms, sigma) for terms in sketch)).count()
+        dense.count(dense.shifted(dense.plus(*sketch), sigma))
         for sigma in (root.real + near, root.real - near)
     )
     if right > 0 or left == 0 or (count >= 0 and (root.real > 0.0) != (count > 0)):
@@ -668,7 +737,7 @@ def attack(seed, loops, kinds=KINDS, tally=None, family="mixed"):
             if kind in kinds and own.random() < share:
                 try:
                     check(tally, own, sketch, loop, point)
-                except UndecidedError:
+                except (UndecidedError, dense.UndecidedError):
                     tally.skipped[f"{kind}: judge undecided"] += 1
         if tally.patient and index % 100 == 99:
             print(

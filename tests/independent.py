@@ -18,6 +18,7 @@ from scipy.linalg import block_diag
 from scipy.special import lambertw
 
 from armlock import paper
+from tests import dense
 
 
 def terms(system, x, y):
@@ -36,34 +37,37 @@ def terms(system, x, y):
     return found
 
 
-def split(system, x, y):
-    """What nothing delays, and coefficients and delay of each other term, as floats."""
-    found = {float(t): np.array([float(v) for v in p]) for t, p in terms(system, x, y).items()}
-    return np.trim_zeros(found.pop(0.0, np.zeros(1)), "b"), [(p, t) for t, p in found.items()]
-
-
 def value(system, s, x, y):
     """D(s; x, y), spelled out."""
-    s, (a, delayed) = np.asarray(s, dtype=complex), split(system, x, y)
-    return sum(np.polyval(b[::-1], s) * np.exp(-s * t) for b, t in [(a, 0.0), *delayed])
+    return dense.value(floats(system, x, y), s)
 
 
-def size(system, s, x, y):
-    """Sum of the magnitudes of the terms of D(s; x, y)."""
-    s, (a, delayed) = complex(s), split(system, x, y)
-    return sum(abs(np.polyval(b[::-1], s) * np.exp(-s * t)) for b, t in [(a, 0.0), *delayed])
+def count(system, x, y, at_zero=0):
+    """Unstable roots of D(s; x, y); as many at s = 0 as `at_zero` says are divided out."""
+    return dense.count(floats(system, x, y), at_zero)
+
+
+def floats(system, x, y):
+    """The terms of D as `tests.dense` takes them."""
+    found = terms(system, x, y).items()
+    return {float(t): np.array([float(v) for v in p[::-1]]) for t, p in found}
+
+
+def each(system, s, x, y):
+    """The terms of D(s; x, y) in mpmath's precision."""
+    s = mpmath.mpc(s)
+    return [
+        mpmath.exp(-s * mpmath.mpf(t.numerator) / t.denominator)
+        * sum(mpmath.mpf(v.numerator) / v.denominator * s**k for k, v in enumerate(p))
+        for t, p in terms(system, x, y).items()
+    ]
 
 
 def exact(system, s, x, y):
     """D(s; x, y) in mpmath's precision; of a loop 1 + L, from its controller and sensor."""
-    s = mpmath.mpc(s)
     if not hasattr(system, "controller"):
-        return sum(
-            mpmath.exp(-s * mpmath.mpf(t.numerator) / t.denominator)
-            * sum(mpmath.mpf(v.numerator) / v.denominator * s**k for k, v in enumerate(p))
-            for t, p in terms(system, x, y).items()
-        )
-    k, m = system.controller, system.mapping
+        return mpmath.fsum(each(system, s, x, y))
+    s, k, m = mpmath.mpc(s), system.controller, system.mapping
     gain = k.gain * mpmath.fprod(s - mpmath.mpc(zero) for zero in k.zeros())
     gain /= mpmath.fprod(s - mpmath.mpc(pole) for pole in k.poles())
     first, second, below = (
@@ -86,66 +90,6 @@ def hayes_roots(a, b, tau=1.0, branches=60):
 def hayes_count(a, b, tau=1.0):
     """Number of roots of the Hayes equation in the right half-plane."""
     return int(np.count_nonzero(hayes_roots(a, b, tau).real > 0.0))
-
-
-def radius_of_unstable_roots(undelayed, delayed):
-    """Radius past which |A| exceeds the delayed terms in the right half-plane."""
-    bound = -np.abs(undelayed)
-    bound[-1] = abs(undelayed[-1])
-    for b, _ in delayed:
-        bound[: b.size] -= np.abs(b)
-    if bound[-1] <= 0.0:
-        raise ValueError("unstable roots are not confined")
-    radius = 1.0
-    while np.polyval(bound[::-1], radius) <= 0.0:
-        radius *= 2.0
-    return radius
-
-
-def winding(f, top, longest, right=None, tiny=0.0):
-    """Zeros of f, real on the real axis, right of the imaginary axis and within a rectangle.
-
-    Half of its contour: from the real axis up at `right` to `top`, back to the imaginary axis
-    and down it, around s = 0 at a distance `tiny`. Steps resolve the longest delay; they are
-    halved until the argument moves by less than 0.7 in each.
-    """
-    right = right or top
-    low = tiny or 1e-9 * top
-    down = np.union1d(np.arange(low, top, 0.3 / longest), np.geomspace(low, top, 400))[::-1]
-    path = [right + 1j * np.linspace(0.0, top, 4000), np.linspace(right, 0.0, 4000) + 1j * top]
-    path += [1j * down, tiny * np.exp(1j * np.linspace(np.pi / 2, 0.0, 200)) if tiny else [0.0]]
-    s = np.concatenate(path)
-    turned = 0.0
-    for first in range(0, s.size - 1, 200_000):
-        here = s[first : first + 200_001]
-        value = f(here)
-        for _ in range(60):
-            assert value.all(), "a zero lies on the contour"
-            turn = np.angle(value[1:] / value[:-1])
-            wide = np.flatnonzero(np.abs(turn) > 0.7)
-            if not wide.size:
-                break
-            middle = 0.5 * (here[wide] + here[wide + 1])
-            here = np.insert(here, wide + 1, middle)
-            value = np.insert(value, wide + 1, f(middle))
-        assert not wide.size, "a zero lies on the contour"
-        turned += turn.sum()
-    count = turned / np.pi
-    assert abs(count - round(count)) < 1e-6
-    return round(count)
-
-
-def count(system, x, y, at_zero=0):
-    """Unstable roots of D(s; x, y); as many at s = 0 as `at_zero` says are divided out."""
-    undelayed, delayed = split(system, x, y)
-    radius = radius_of_unstable_roots(undelayed, delayed)
-
-    def f(s):
-        d = sum(np.polyval(b[::-1], s) * np.exp(-s * t) for b, t in delayed)
-        return (np.polyval(undelayed[::-1], s) + d) / s**at_zero
-
-    longest = max((t for _, t in delayed), default=0.0) + 1.0
-    return winding(f, radius, longest, tiny=1e-6 * radius if at_zero else 0.0)
 
 
 def map_eigenvalues(system, x, y):

@@ -32,7 +32,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.stability.semidiscretization import semi_discretization
-from tests import independent
+from tests import dense, draws
 
 # published systems ------------------------------------------------
 
@@ -112,10 +112,10 @@ def winding(parts, right_of=0.0):
     top = abs(right_of) + sum(
         np.linalg.norm(a) * np.exp(-min(right_of, 0.0) * h) for h, a in parts.items()
     )
-    return independent.winding(d, top, 5.0)
+    return dense.winding(d, top, 5.0)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(draws(4, 40)))
 def test_drawn_state_spaces_have_the_poles_of_their_matrices(seed):
     rng = np.random.default_rng(seed)
     n, number = int(rng.integers(2, 7)), int(rng.integers(1, 4))
@@ -138,7 +138,7 @@ def test_the_transfer_function_of_a_state_space_is_that_of_its_matrices():
         assert system(at) == pytest.approx(c @ np.linalg.solve(at * np.eye(4) - a, b) + d)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(draws(7, 60)))
 def test_drawn_matrices_have_the_winding_number_of_their_determinant(seed):
     rng = np.random.default_rng(seed)
     gain, dead = rng.normal(size=(2, 2)), rng.uniform(0.1, 3.0, (2, 2))
@@ -164,7 +164,7 @@ def test_drawn_matrices_have_the_winding_number_of_their_determinant(seed):
 
     loops = return_difference(plant, controllers)
     assert loops.numerator.degree == 6
-    assert unstable_roots(loops) == independent.winding(d, 300.0, 6.0)
+    assert unstable_roots(loops) == dense.winding(d, 300.0, 6.0)
     root = rightmost_root(loops)
     assert abs(d(root)) < 1e-9
 
@@ -360,7 +360,7 @@ def test_the_uniform_kernel_is_stable_below_a_known_gain():
     assert margins(loop, 1.0).gain_upper == pytest.approx(limit, rel=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(draws(7, 60)))
 def test_loops_with_moving_averages_are_counted_without_their_zeros(seed):
     """L = k exp(-s d) Q_1 (1 + g Q_2) / (s + p), with two moving averages Q."""
     rng = np.random.default_rng(seed)
@@ -373,7 +373,7 @@ def test_loops_with_moving_averages_are_counted_without_their_zeros(seed):
         whole = at + p + k * np.exp(-at * d) * kernel(at, h) * (1 + g * kernel(at, h2))
         return whole / (1 + abs(at))
 
-    count = independent.winding(closed, 300.0, 5.0)
+    count = dense.winding(closed, 300.0, 5.0)
     several = return_difference([[loop]], [1], at_zero=2)
     for system in (loop, equation(1 + loop, at_zero=2), several):
         assert unstable_roots(system) == count
@@ -427,7 +427,7 @@ def test_moving_averages_in_a_matrix_are_stated():
     assert abs(d(rightmost_root(found))) < 1e-12
     # The poles at -1, -2, -3 and -0.5 lie left of neither line.
     for line in (-0.2, -0.4):
-        count = independent.winding(lambda at, line=line: d(at + line), 300.0, 5.0)
+        count = dense.winding(lambda at, line=line: d(at + line), 300.0, 5.0)
         assert unstable_roots(found, right_of=line) == count
     for fewer in (None, 1):
         assert rightmost_root(return_difference(plant, [1, 2], at_zero=fewer)) == 0.0

@@ -23,7 +23,8 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from tests.dense_judge import dense_margins
+from tests import draws
+from tests.dense import dense_margins
 
 
 def predictor(controller, plant, model, true):
@@ -56,7 +57,7 @@ def drawn(seed):
     return pi, plant, rng.uniform(0.3, 4.0), direct
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(draws(3, 24)))
 def test_smith_predictors_have_their_margins_by_the_identity_of_their_delay(seed):
     pi, plant, theta, direct = drawn(seed)
     process, controller, z = control.tf(*plant), control.tf(*pi), delay(theta)

@@ -11,7 +11,7 @@ import pytest
 from armlock import Controller, Loop, delay, paper, paper_loop, unstable_roots
 from armlock.controllers import table_two, white_paper
 from armlock.sensors import dual, modified_dual
-from tests import independent
+from tests import dense
 
 RING = ("12", "13", "31", "32", "23", "21")
 # The trees of lisainstrument 2.3 with primary laser 12: the connection that is not used.
@@ -206,10 +206,10 @@ SYSTEMS = {
 def test_the_count_is_the_winding_number(name):
     (f, loop, box), expected = SYSTEMS[name]
     assert unstable_roots(loop) == expected
-    assert independent.winding(f, *box) == expected
+    assert dense.winding(f, *box) == expected
 
 
 def test_a_count_that_is_wrong_is_caught():
     # The same contour with the other sign of the arms' difference.
     f, _, box = two_trips(20.1, 19.9, difference=-0.2)
-    assert independent.winding(f, *box) == unstable_roots(paper_loop(difference=-0.2)) != 0
+    assert dense.winding(f, *box) == unstable_roots(paper_loop(difference=-0.2)) != 0

@@ -38,7 +38,7 @@ from armlock.engine.decide import Family
 from armlock.engine.inclusion import TERM, VERTEX
 from armlock.robustness.varying import spectral_factor
 from armlock.sensors import SignalMapping
-from tests.peaks import dense_peak, draw, pair, system_of
+from tests import dense
 
 # Found by others with a dense grid.
 PUBLISHED = {
@@ -69,16 +69,16 @@ def test_the_radius_with_half_the_difference():
 def test_peak_gains_against_a_dense_search():
     rng, number, places = np.random.default_rng(21), 0, set()
     while number < 12:
-        _, n, d = draw(rng)
+        n, d = dense.drawn_closed(rng)
         try:
-            found = peak_gain(system_of(n, d))
+            found = peak_gain(dense.quotient(n, d))
         except ValueError:
             continue
         number += 1
-        assert found.gain == pytest.approx(dense_peak(n, d), rel=2e-6)
+        assert found.gain == pytest.approx(dense.peak(n, d), rel=2e-6)
         places.add(found.omega if found.omega in (0.0, math.inf) else "between")
         if 0.0 < found.omega < math.inf:
-            at = abs(pair(n, found.omega) / pair(d, found.omega))
+            at = abs(dense.value(n, 1j * found.omega) / dense.value(d, 1j * found.omega))
             assert at == pytest.approx(found.gain, rel=1e-7)
     assert places == {0.0, math.inf, "between"}
 
@@ -86,7 +86,7 @@ def test_peak_gains_against_a_dense_search():
 def test_no_level_that_is_too_good_is_certified():
     rng, number = np.random.default_rng(22), 0
     while number < 12:
-        system = system_of(*draw(rng)[1:])
+        system = dense.quotient(*dense.drawn_closed(rng))
         n, d = system.affine.quotient()
         if decide.count(d) != 0:
             continue
@@ -366,4 +366,4 @@ def test_a_limit_that_is_not_decided_is_not_a_number():
     # Two delays act in different proportions, and the largest gain is at no sign of either.
     n, d = {0.0: [1.0], 1.0: [0.5], 1.37: [-0.4]}, {0.0: [1.0], 1.0: [0.3], 1.37: [0.2]}
     with pytest.raises(CountError, match="no peak gain: the behaviour at high frequency"):
-        peak_gain(system_of(n, d))
+        peak_gain(dense.quotient(n, d))
