@@ -28,7 +28,7 @@ sources = $(shell find $(1) -type f -not -name '*.py[co]' -not -name '*.nb[ic]' 
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book pdf print browser same lab test tests claims pins bench dist \
+.PHONY: help env book pdf print browser same lab test tests attack claims pins bench dist \
 	lint format lock clean
 
 help: ## List the targets
@@ -113,7 +113,7 @@ browser: ## Check every page and all windows in Chromium; run the code as it sho
 	+@$(alone) $(BOOK)
 	$(PY) tools/check_browser.py build/html
 	$(PY) tools/check_cells.py build/html
-	EVERY_WINDOW=1 $(PYTEST) tests/test_live.py
+	FULL=1 $(PYTEST) tests/test_live.py
 
 lab: $(READY) ## Open the notebooks in JupyterLab
 	$(VENV)/bin/jupyter-lab --notebook-dir notebooks $(if $(filter 0,$(shell id -u)),--allow-root)
@@ -123,6 +123,10 @@ test: ## Run all tests, notebooks included
 
 tests: $(EXECUTED)
 	$(PYTEST) tests
+
+attack: $(EXECUTED) ## Run all tests in full: more random cases, all windows; and brute force
+	FULL=1 $(PYTEST) tests
+	$(PY) -m tests.attack --loops 200
 
 claims: $(READY) ## Print the ledger of claims, and write it as CSV and JSON
 	@$(PY) -m book.companion.ledger show build/claims

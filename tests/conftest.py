@@ -5,28 +5,23 @@ from pathlib import Path
 import pytest
 from hypothesis import Phase, settings
 
+from tests import FULL, draws
+
 # The matrices here are small, and several workers share the machine.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-# The same examples in every run and on every worker; times of a shared machine say nothing.
-# Explaining a failure traces every line, which does not go with loading compiled code.
+# The same examples in every run and on every worker, but with FULL=1; times of a shared machine
+# say nothing. Explaining a failure traces every line, which does not go with loading compiled
+# code.
 settings.register_profile(
     "armlock",
-    derandomize=True,
-    deadline=None,
-    max_examples=60,
-    phases=[Phase.explicit, Phase.generate, Phase.shrink],
-)
-# Other examples in every run, and more: pytest --hypothesis-profile=random. A failure is
-# printed with what makes it again (@reproduce_failure).
-settings.register_profile(
-    "random",
-    settings.get_profile("armlock"),
-    derandomize=False,
+    derandomize=not FULL,
     database=None,
-    max_examples=500,
-    print_blob=True,
+    deadline=None,
+    max_examples=draws(30, 500),
+    phases=[Phase.explicit, Phase.generate, Phase.shrink],
+    print_blob=FULL,
 )
 settings.load_profile("armlock")
 

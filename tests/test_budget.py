@@ -25,7 +25,7 @@ from armlock import (
 from armlock.performance.budget import LEVELS, tdi_capability
 from armlock.performance.pulling import largest_pulling
 from armlock.sensors import SINGLE, modified_dual
-from tests import independent
+from tests import draws, independent
 
 FLIGHT = flight_loop()
 DAY = 86400.0
@@ -157,7 +157,7 @@ def steps_answer(poles, gain, tau, end, each):
     return phi[each + 2 :]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(draws(3, 30)))
 def test_pulling_is_what_the_method_of_steps_gives(seed):
     rng = np.random.default_rng(seed)
     tau, damping = 3.0, float(rng.uniform(0.05, 0.6))

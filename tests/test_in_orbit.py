@@ -24,6 +24,7 @@ from armlock import (
 )
 from armlock.orbits import SPEED_OF_LIGHT, kepler
 from armlock.sensors import dual
+from tests import draws
 
 ROOT = Path(__file__).parents[1]
 DAY = 86400.0
@@ -68,7 +69,7 @@ def test_a_range_reaches_ratios_of_the_wrong_sign(chapter, weak):
     loop, (low, high) = weak
     # At s = 0 the sensor's response is x/h, the controller's 10: 1 + L = 0 at -0.1.
     assert abs(low + 0.1) < 1e-5
-    for ratio in np.random.default_rng(4).uniform(low, high, 20):
+    for ratio in np.random.default_rng(4).uniform(low, high, draws(6, 20)):
         assert unstable_roots(at_ratio(chapter, loop, ratio), 1.0, 1.0) == 0
     for ratio in (low - 1e-4, high + 1e-4):
         assert unstable_roots(at_ratio(chapter, loop, ratio), 1.0, 1.0) != 0
@@ -93,7 +94,7 @@ def test_stable_times_agree_with_counts_at_random_times(chapter, weak, name, rul
     x, edges = chapter["half"][case], weak[1] if name == "weak" else chapter["ranges"][name]
     r = chapter["ratio"](x, rule)
     start, stop = chapter["unstable_times"](r, *edges)
-    for t in np.random.default_rng(8).uniform(x.x[0], x.x[-1], 60):
+    for t in np.random.default_rng(8).uniform(x.x[0], x.x[-1], draws(25, 200)):
         tau1, tau2 = map(float, round_trips(chapter, case, t))
         h = float(x(t) / r(t))
         if min(abs(float(r(t)) / edge - 1.0) for edge in edges) < 1e-3:
@@ -192,7 +193,7 @@ def simulated_rate(chapter, case, loop, start, duration):
 
 def test_frozen_rates_are_those_of_simulations_with_moving_delays(chapter):
     rates = []
-    for case, loop, start, duration, rate in drawn(chapter, 12):
+    for case, loop, start, duration, rate in drawn(chapter, draws(6, 36)):
         grown = simulated_rate(chapter, case, loop, start, duration)
         assert 0.5 < grown / rate < 2.0
         rates.append(rate)

@@ -14,6 +14,7 @@ from armlock.engine.decide import Family
 from armlock.engine.functions import Space, compiled, stacked
 from armlock.engine.polynomials import Polynomial
 from armlock.engine.tolerances import UNCONFINED
+from tests import draws
 from tests.test_inclusion import (
     Exact,
     after,
@@ -29,7 +30,7 @@ from tests.test_inclusion import (
 def test_differences_of_delays_that_are_no_floats():
     # What a difference rounds by may be far larger than what its float rounds by.
     rng, shares = np.random.default_rng(11), []
-    for _ in range(200):
+    for _ in range(draws(80, 800)):
         first = Fraction(10.0 ** rng.uniform(0, 7)) / 3
         apart = Fraction(float(first) * 10.0 ** rng.uniform(-18, -1)) / 7
         middle = 10.0 ** rng.uniform(1, 15) / float(first)
@@ -43,7 +44,7 @@ def test_differences_of_delays_that_are_no_floats():
         exact = Exact(function)
         for t in (-1.0, 0.0, 1.0):
             shares.append(share_of_bound(function, exact, middle, half, work, t))
-    assert len(shares) > 200
+    assert len(shares) > 80
     assert max(shares) <= 1.0
     assert max(shares) > 0.3
 
@@ -75,7 +76,7 @@ def pair(functions, y, omega):
 def test_each_crossing_is_where_it_is_said_to_be():
     rng = np.random.default_rng(12)
     shares: list[float] = []
-    while len(shares) < 60:
+    while len(shares) < draws(25, 250):
         space, functions = rows_of(rng)
         size = float(np.median(space.corners))
         y, most = rng.normal(size=3), np.full(3, 30.0)
@@ -116,7 +117,7 @@ def test_an_exponential_that_is_not_resolved_leaves_a_crossing_undecided():
 def test_a_family_is_clear_at_both_ends_of_the_axis(where):
     rng = np.random.default_rng(13)
     least: list[float] = []
-    while len(least) < 400:
+    while len(least) < draws(150, 1500):
         first = draw(rng, 4)
         space, shape = first.space, first.delayed.shape
         second = first + function_of(space, 0.3 * rng.normal(size=shape[0]), np.zeros(shape))
@@ -151,7 +152,7 @@ def test_rounding_does_not_confine_the_zeros_of_a_moved_function():
     polynomials = [Polynomial.of([1]), Polynomial.of([0, 1])]
     space = Space(polynomials, after([1, Fraction(11, 10)]))
     rng = np.random.default_rng(14)
-    for _ in range(400):
+    for _ in range(draws(100, 1000)):
         weights = rng.uniform(0.1, 3.0, 2).tolist()
         function = function_of(space, [1, sum(map(Fraction, weights))], [[0, 0], weights])
         moved = function.shifted(rng.uniform(30.0, 40.0))

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from matplotlib import pyplot as plt
 
+from tests import FULL
+
 BOOK = Path(__file__).parents[1] / "book"
 #: A recipe with packages that the environment does not hold.
 APART = "## From the locked laser to TDI"
@@ -43,6 +45,7 @@ def missing(package, pinned):
         return True
 
 
+@pytest.mark.skipif(not FULL, reason="takes half a minute, and five packages: make attack")
 def test_the_locked_laser_goes_through_tdi_as_chapter_14_says(tmp_path):
     """What the environment does not hold is fetched without its requirements.
 

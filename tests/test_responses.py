@@ -19,6 +19,7 @@ import pytest
 from flint import acb, acb_poly, acb_series, arb, fmpq, fmpq_poly
 
 from armlock import delay, impulse_response, s, step_response
+from tests import draws
 
 _S = fmpq_poly([0, 1])
 _BITS = 2000
@@ -173,7 +174,7 @@ def drawn(rng):
     return make, thetas, last
 
 
-@pytest.mark.parametrize("seed", range(50))
+@pytest.mark.parametrize("seed", range(draws(15, 150)))
 def test_responses_are_their_expansions_in_delays(seed):
     rng = np.random.default_rng([65, seed])
     make, thetas, last = drawn(rng)

@@ -20,6 +20,7 @@ from armlock import (
     state_space,
     unstable_roots,
 )
+from tests import draws
 
 HAAG = (
     [[-1, 13.5, -1], [-3, -1, -2], [-2, -1, -4]],
@@ -76,7 +77,7 @@ def drawn(rng):
     return late * float(rng.uniform(0.2, 2.0)) / p, z
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(draws(8, 60)))
 def test_counts_between_the_edges_are_those_at_any_length(seed):
     rng = np.random.default_rng([69, seed])
     system, z = drawn(rng)
