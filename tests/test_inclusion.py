@@ -195,7 +195,7 @@ def test_a_factor_of_each_power_reaches_the_remainder():
 @pytest.mark.parametrize("kind", ["polynomial", "cancelling", "any"])
 def test_rounding_at_a_frequency(kind):
     rng, shares = np.random.default_rng(2), []
-    for _ in range(draws(100, 1000)):
+    for _ in range(draws(250, 1000)):
         if kind == "polynomial":
             function = draw(rng, 10, delays=0)
         else:
@@ -234,7 +234,7 @@ def test_phase_of_an_exponential():
 
 def test_computed_roots_miss_a_polynomial_by_no_more_than_stated():
     rng, shares = np.random.default_rng(4), []
-    for trial in range(draws(300, 5000)):
+    for trial in range(draws(1000, 5000)):
         degree = rng.integers(1, 9)
         near = np.poly(-rng.uniform(0.9, 1.1, degree))[::-1]
         coefficients = near if trial % 2 else rng.normal(size=degree + 1)

@@ -117,7 +117,7 @@ def test_an_exponential_that_is_not_resolved_leaves_a_crossing_undecided():
 def test_a_family_is_clear_at_both_ends_of_the_axis(where):
     rng = np.random.default_rng(13)
     least: list[float] = []
-    while len(least) < draws(150, 1500):
+    while len(least) < draws(400, 1500):
         first = draw(rng, 4)
         space, shape = first.space, first.delayed.shape
         second = first + function_of(space, 0.3 * rng.normal(size=shape[0]), np.zeros(shape))
