@@ -341,7 +341,7 @@ def test_more_points_than_memory_holds_are_refused():
 
 def test_where_rounding_hides_all_crossings_few_intervals_are_kept(monkeypatch):
     # N is c2 times M, but for a part in 1e16: each step leaves an interval undecided.
-    monkeypatch.setattr(crossings, "_MOST_STEPS", 20_000)
+    monkeypatch.setattr(crossings, "STEPS_OF_ROWS", 20_000)
     loop = Loop(Controller([], [-1.0], 1e16), DIFFERENCE, 20.0, 20.0)
     constant, first, second = loop.affine.terms
     functions = constant, second * -1, first * -1
