@@ -193,9 +193,6 @@ class Loop(System):
 
     _repr_html_ = as_html
 
-    def _repr_latex_(self) -> None:
-        """Show no text: multiplied out, a loop is none that one reads."""
-
     def __setattr__(self, name: str, value: Any) -> None:
         """Raise where an argument would change without the loop."""
         if name in vars(self):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from armlock.checks import FloatArray, real_array, whole_number
+from armlock.checks import real_array, whole_number
 from armlock.engine.polynomials import exact, order, polynomial
 from armlock.engine.statespace import bordered, settled
 from armlock.systems import (
@@ -66,7 +66,8 @@ def determinant(matrix: Any, *, at_zero: int | None = None) -> System:
     >>> print(f"{rightmost_root(tanks):.4f}")
     0.1357+0.0000j
     """
-    return _whole(matrix).equation(at_zero)
+    d, nominal, _, zeros = _whole(matrix)
+    return equation_of(d, nominal, at_zero, zeros)
 
 
 def return_difference(plant: Any, controllers: Any, *, at_zero: int | None = None) -> System:
@@ -115,7 +116,7 @@ def return_difference(plant: Any, controllers: Any, *, at_zero: int | None = Non
             f"controllers must be {inputs} x {outputs}, as the plant is {outputs} x {inputs}, "
             f"got shape {k.shape}"
         )
-    whole = _whole(
+    whole, nominal, poles, zeros = _whole(
         np.block(
             [
                 [a, np.zeros((n, outputs), object), -b],
@@ -124,18 +125,18 @@ def return_difference(plant: Any, controllers: Any, *, at_zero: int | None = Non
             ]
         )
     )
-    states = n + whole.poles
-    if whole.d.degree > states:
+    states = n + poles
+    if whole.degree > states:
         raise ValueError(
             "plant and controllers must not have more zeros than poles: the determinant has "
-            f"s^{whole.d.degree} with {states} states; give the controllers a filter"
+            f"s^{whole.degree} with {states} states; give the controllers a filter"
         )
-    if all(lag or p.degree() < states for (lag, _), p in whole.d.terms.items()):
+    if all(lag or p.degree() < states for (lag, _), p in whole.terms.items()):
         raise ValueError(
             "the loops must be well posed: at high frequency what nothing delays has a "
             "determinant of zero"
         )
-    return whole.equation(at_zero)
+    return equation_of(whole, nominal, at_zero, zeros)
 
 
 def state_space(
@@ -158,10 +159,9 @@ def state_space(
         Without them the equation of the poles is returned.
     d : float, or array_like of one, optional
         What goes through directly.
-    integrators : int, optional
-        How many poles are meant to be zero, 0 or 1, where rounding of the matrices hides it.
-    zeros : int, optional
-        The same for the zeros, of which a pole that `b` does not reach is one.
+    integrators, zeros : int, optional
+        How many poles and zeros of the transfer function are at s = 0, where rounding of the
+        matrices hides it. A pole at s = 0 that `b` does not reach is a zero too.
     at_zero : int, optional
         How many poles at s = 0 the equation leaves out, as of `equation`.
 
@@ -189,16 +189,12 @@ def state_space(
     rows = _states(a)
     below = _determinant(rows)
     if b is None:
-        if zeros is not None:
-            raise TypeError(f"zeros must not be given without b and c, got {zeros}")
-        if integrators is not None:
-            below = below + -_rounding("integrators", integrators, below)
-        if integrators == 0 and at_zero is None:
-            at_zero = 0
+        if (integrators, zeros) != (None, None):
+            raise TypeError("integrators and zeros are for b and c: state at_zero without them")
         return equation_of(below, {}, at_zero)
     if at_zero is not None:
         raise TypeError(f"at_zero must not be given with b and c, got {at_zero}")
-    column, row, direct = (_matrix(*pair).ravel() for pair in (("b", b), ("c", c), ("d", d)))
+    column, row, direct = (real_array(*pair).ravel() for pair in (("b", b), ("c", c), ("d", d)))
     if (len(column), len(row), len(direct)) != (len(rows), len(rows), 1):
         raise ValueError(
             f"b and c must have {len(rows)} numbers, and d one, got {len(column)}, "
@@ -225,24 +221,9 @@ def _number(value: Any) -> Sum:
     return Sum.of(polynomial([value]))
 
 
-def _is_of_control(value: Any) -> bool:
-    """Tell whether it is a system of python-control."""
-    return hasattr(value, "isdtime") and not isinstance(value, System)
-
-
-def _matrix(name: str, value: Any) -> FloatArray:
-    """Return numbers; for a system of python-control raise, and say what to write."""
-    if _is_of_control(value):
-        raise TypeError(
-            f"{name} must hold numbers, got a {type(value).__name__}: without delays write "
-            "System.of(p) for p; with delays write matrices, {0: p.A, 1.5: A_1}, p.B, p.C, p.D"
-        )
-    return real_array(name, value)
-
-
 def _parts(plant: Any) -> tuple[Any, ...]:
     """Return A with s on its diagonal, B, C and D; without states for a matrix of systems."""
-    if _is_of_control(plant) and hasattr(plant, "A"):
+    if hasattr(plant, "isdtime") and hasattr(plant, "A"):
         check_continuous("plant", plant)
         plant = plant.A, plant.B, plant.C, plant.D
     if not (isinstance(plant, tuple) and len(plant) in (3, 4)):
@@ -251,9 +232,9 @@ def _parts(plant: Any) -> tuple[Any, ...]:
         return *none, d
     a, b, c, *d = plant
     rows = _states(a)
-    b, c = (np.atleast_2d(_matrix(*pair)) for pair in (("B", b), ("C", c)))
+    b, c = (np.atleast_2d(real_array(*pair)) for pair in (("B", b), ("C", c)))
     b = b.reshape(len(rows), -1)
-    d = _matrix("D", d[0]) if d else np.zeros((len(c), b.shape[1]))
+    d = real_array("D", d[0]) if d else np.zeros((len(c), b.shape[1]))
     states = [[System(p, _ONE) for p in row] for row in rows]
     return tuple(np.array(part, object) for part in (states, b, c, d))
 
@@ -262,13 +243,8 @@ def _array(name: str, matrix: Any) -> Any:
     """Return systems as an array; those of a sequence as one column."""
     if isinstance(matrix, np.ndarray) and matrix.dtype != object:
         matrix = real_array(name, matrix).tolist()
-    if _is_of_control(matrix):
-        raise TypeError(
-            f"{name} must be a sequence of rows, got a {type(matrix).__name__}: for p write "
-            "[[p[i, k] for k in range(p.ninputs)] for i in range(p.noutputs)]"
-        )
     if not isinstance(matrix, list | tuple | np.ndarray):
-        raise TypeError(f"{name} must be a sequence of rows, got {matrix!r:.200}")
+        raise TypeError(f"{name} must be a list of rows of systems, got {matrix!r:.200}")
     listed = [row if isinstance(row, list | tuple | np.ndarray) else [row] for row in matrix]
     if len({len(row) for row in listed}) != 1:
         raise ValueError(f"{name} must have rows of one length, got {matrix!r:.200}")
@@ -278,7 +254,7 @@ def _array(name: str, matrix: Any) -> Any:
 def _states(a: Any) -> list[list[Sum]]:
     """Return s - A_0 - A_1 exp(-s h_1) - ..."""
     given = a if isinstance(a, Mapping) else {0.0: a}
-    parts = {h: _matrix("a", part) for h, part in given.items()}
+    parts = {h: real_array("a", part) for h, part in given.items()}
     shapes = {part.shape for part in parts.values()}
     shape = shapes.pop()
     if shapes or len(shape) != 2 or shape[0] != shape[1]:
@@ -294,39 +270,18 @@ def _states(a: Any) -> list[list[Sum]]:
     return found
 
 
-class _Whole(NamedTuple):
-    """The determinant of a matrix whose rows are cleared of denominators.
+def _whole(matrix: Any) -> tuple[Sum, dict[str, float | None], int, int]:
+    """Return the determinant of a matrix whose rows are cleared of denominators.
 
-    Attributes
-    ----------
-    d : Sum
-        The determinant.
-    nominal : dict of str to float or None
-        The parameters.
-    poles : int
-        Degree of the denominators that are cleared.
-    cleared : int
-        How many of the roots at s = 0 come from clearing denominators.
+    With it come the parameters, the degree of these denominators, and how many of the roots at
+    s = 0 they make.
     """
-
-    d: Sum
-    nominal: dict[str, float | None]
-    poles: int
-    cleared: int
-
-    def equation(self, at_zero: int | None) -> System:
-        """Return the equation, without the roots at s = 0 that are stated."""
-        return equation_of(self.d, self.nominal, at_zero, self.cleared)
-
-
-def _whole(matrix: Any) -> _Whole:
-    """Return the determinant of a matrix."""
     rows = _array("matrix", matrix)
     size, columns = rows.shape
     if size != columns:
         raise ValueError(f"matrix must be square, got {size} x {columns}")
     cleared, poles, zeros = zip(*map(_cleared, rows), strict=True)
-    return _Whole(_determinant(cleared), names_of(rows.ravel()), sum(poles), sum(zeros))
+    return _determinant(cleared), names_of(rows.ravel()), sum(poles), sum(zeros)
 
 
 def _cleared(row: Sequence[System]) -> tuple[list[Sum], int, int]:

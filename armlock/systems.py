@@ -55,23 +55,9 @@ if TYPE_CHECKING:
 _ONE, _S = fmpq_poly([1]), fmpq_poly([0, 1])
 # Arguments of the functions that take values of parameters by name.
 _TAKEN = frozenset(
-    [
-        "self",
-        "system",
-        "loop",
-        "s",
-        "squeeze",
-        "omega",
-        "omega_max",
-        "points_per_turn",
-        "free_above",
-        "right_of",
-        "step",
-        "order",
-        "z",
-        "longest",
-    ]
-)
+    ("self", "system", "loop", "s", "squeeze", "omega", "omega_max", "points_per_turn",
+     "free_above", "right_of", "step", "order", "z", "longest")
+)  # fmt: skip
 # Coefficients at s = 0 that are looked at for a limit there.
 _TERMS = 16
 # What to write where python-control, or its user, asks a system for something.
@@ -81,8 +67,7 @@ _INSTEAD = {
     "response": "armlock.nyquist(L, omega_max=...).plot()",
     "dcgain": "L(0)",
 }
-# Largest power of a system, and longest text of one.
-_LARGEST_POWER = 10**6
+# Longest text of a system.
 _LONGEST_TEXT = 400
 # A longer text of a system without delays and parameters is that of its factors.
 _LONGEST_RATIONAL = 60
@@ -159,19 +144,19 @@ NOW = Lag()
 
 #: A product of delays, and the names of the parameters that are multiplied.
 Key = tuple[Lag, tuple[str, ...]]
-#: Sizes of coefficients, by the parameters that are multiplied.
-Sizes = dict[tuple[str, ...], fmpq_poly]
+#: What stands before each product of delays and parameters.
+Terms = dict[Key, fmpq_poly]
 
 
 class Sum:
     """A sum of polynomials of s times delays and parameters: {(lag, names): polynomial}.
 
     Where terms were put together, it keeps the sizes that they had before: the magnitudes of
-    coefficients, by products of parameters. Of a coefficient that is much smaller rounding may
-    be all that is left.
+    coefficients, by products of parameters, without delays. Of a coefficient that is much
+    smaller rounding may be all that is left.
     """
 
-    def __init__(self, terms: Mapping[Key, fmpq_poly], sizes: Sizes | None = None) -> None:
+    def __init__(self, terms: Mapping[Key, fmpq_poly], sizes: Terms | None = None) -> None:
         self.terms = {key: p for key, p in terms.items() if p}
         self._sizes = sizes
 
@@ -189,11 +174,7 @@ class Sum:
 
     def __mul__(self, other: Sum) -> Sum:
         """Return the product."""
-        found = collected(
-            ((t.times(u), tuple(sorted(a + b))), p * q)
-            for (t, a), p in self.terms.items()
-            for (u, b), q in other.terms.items()
-        )
+        found = _times(self.terms, other.terms)
         if len(found) == len(self.terms) * len(other.terms) and self._plain(other):
             return Sum(found)
         return Sum(found, _times(self.sizes, other.sizes))
@@ -203,11 +184,11 @@ class Sum:
         return self._sizes is None and other._sizes is None
 
     @property
-    def sizes(self) -> Sizes:
+    def sizes(self) -> Terms:
         """The sizes that its terms had before they were put together."""
         if self._sizes is None:
             self._sizes = collected(
-                (names, fmpq_poly([abs(c) for c in p.coeffs()]))
+                ((NOW, names), fmpq_poly([abs(c) for c in p.coeffs()]))
                 for (_, names), p in self.terms.items()
             )
         return self._sizes
@@ -232,21 +213,10 @@ class Sum:
         """Put sums in place of parameters."""
         if not values:
             return self
-        found = Sum({})
-        for (lag, names), p in self.terms.items():
-            term = Sum.of(p, lag, *(a for a in names if a not in values))
-            for name in names:
-                term = term * values[name] if name in values else term
-            found = found + term
-        if self._sizes is None:
-            return found
-        sizes: Sizes = {}
-        for names, p in self._sizes.items():
-            size = {tuple(a for a in names if a not in values): p}
-            for name in names:
-                size = _times(size, values[name].sizes) if name in values else size
-            sizes = collected((*sizes.items(), *size.items()))
-        return Sum(found.terms, sizes)
+        terms = _put(self.terms, {name: value.terms for name, value in values.items()})
+        return Sum(
+            terms, _put(self.sizes, {name: value.sizes for name, value in values.items()})
+        )
 
     def before(self, *names: str) -> dict[Lag, fmpq_poly]:
         """Return what stands before a product of parameters, by delays."""
@@ -258,7 +228,7 @@ class Sum:
         Powers of the product are negative, so that all terms become earlier.
         """
         divisor = _S**power
-        sizes = self._sizes and {names: p // divisor for names, p in self._sizes.items()}
+        sizes = self._sizes and {key: p // divisor for key, p in self._sizes.items()}
         terms = {(lag.times(early), a): p // divisor for (lag, a), p in self.terms.items()}
         return Sum(terms, sizes)
 
@@ -270,7 +240,7 @@ class Sum:
         longest = max((lag.time for lag in self.lags), default=fmpq(0))
         growth = [ROUNDED * longest**k / factorial(k) for k in range(number)]
         found = []
-        for names, size in sorted(self.sizes.items()):
+        for (_, names), size in sorted(self.sizes.items()):
             bounds = [
                 sum((size[i] * growth[k - i] for i in range(k + 1)), fmpq(0))
                 for k in range(number)
@@ -282,8 +252,7 @@ class Sum:
         """Return the sum with zeros for the lowest coefficients at s = 0."""
         if not stated:
             return self
-        lowest = {(NOW, names): self.series(stated, names) for names in self.sizes}
-        return self + Sum({key: -fmpq_poly(c) for key, c in lowest.items()})
+        return self + -Sum({key: fmpq_poly(self.series(stated, key[1])) for key in self.sizes})
 
     def whole(self) -> fmpq_poly:
         """Return the sum of all polynomials: what is left at s = 0."""
@@ -305,14 +274,8 @@ class Sum:
 
     def order(self) -> int:
         """Return the order of the zero at s = 0 that it has for all values of parameters."""
-        number = 1
-        while number <= _TERMS:
-            series = [self.series(number, names) for _, names in self.terms]
-            found = min(map(order, series), default=number)
-            if found < number:
-                return found
-            number *= 4
-        return _TERMS
+        kinds = {names for _, names in self.terms}
+        return min((order(self.series(_TERMS, names)) for names in kinds), default=_TERMS)
 
     def by_length(self, *names: str) -> dict[fmpq, fmpq_poly]:
         """Return what stands before a product of parameters, by lengths in ascending order."""
@@ -320,11 +283,24 @@ class Sum:
         return {time: p for time, p in sorted(found.items()) if p}
 
 
-def _times(a: Sizes, b: Sizes) -> Sizes:
-    """Multiply sizes."""
-    if len(a) == len(b) == 1 and () in a and () in b:
-        return {(): a[()] * b[()]}
-    return collected((tuple(sorted(m + n)), p * q) for m, p in a.items() for n, q in b.items())
+def _times(first: Terms, second: Terms) -> Terms:
+    """Multiply the terms of two sums."""
+    return collected(
+        ((t.times(u), tuple(sorted(a + b))), p * q)
+        for (t, a), p in first.items()
+        for (u, b), q in second.items()
+    )
+
+
+def _put(terms: Terms, values: Mapping[str, Terms]) -> Terms:
+    """Put terms in place of parameters."""
+    found: Terms = {}
+    for (lag, names), p in terms.items():
+        term = {(lag, tuple(a for a in names if a not in values)): p}
+        for name in names:
+            term = _times(term, values[name]) if name in values else term
+        found = collected((*found.items(), *term.items()))
+    return found
 
 
 _UNITY = Sum.of(_ONE)
@@ -445,6 +421,10 @@ class System:
         then lost. The next coefficient is asked in the same way. With ``integrators=0`` the
         coefficients are taken as they are.
 
+        A transfer function made of a state space in badly scaled coordinates (of a condition of
+        a hundred or more) may hold more rounding than that, and poles that are all at s = 0
+        have nothing to be compared with: give the state space itself, or the factors.
+
         python-control multiplies all factors out, those of `control.zpk` too. It turns
         ``control.zpk([], [-1e-3] * 5, 1)`` into five complex poles around -1e-3. Write
         ``Controller([], [-1e-3] * 5, 1)`` instead.
@@ -458,13 +438,12 @@ class System:
         """
         is_number = isinstance(system, fmpq | Fraction | float | int | np.number | np.ndarray)
         is_triple = isinstance(system, tuple) and len(system) == 3
-        if isinstance(system, System) or is_number or is_triple:
-            for stated, given in (("integrators", integrators), ("zeros", zeros)):
-                if given is not None:
-                    raise TypeError(
-                        f"{stated} is for a state space or transfer function of "
-                        f"python-control, got {given} and {system!r:.200}"
-                    )
+        is_exact = isinstance(system, System) or is_number or is_triple
+        if is_exact and (integrators, zeros) != (None, None):
+            raise TypeError(
+                "integrators and zeros are for a state space or transfer function of "
+                f"python-control, got {system!r:.200}"
+            )
         if isinstance(system, System):
             return system
         if is_triple:
@@ -531,10 +510,6 @@ class System:
         """Return a whole power; a delay's power is as long as so many of this one delay."""
         if isinstance(power, bool) or not isinstance(power, int | np.integer):
             raise TypeError(f"power must be a whole number, got {power!r}")
-        if abs(power) > _LARGEST_POWER:
-            raise ValueError(
-                f"power must be at most {_LARGEST_POWER} in size, got a larger one"
-            )
         found, base = System.of(1), self if power >= 0 else 1 / self
         left = abs(int(power))
         while left:
@@ -817,25 +792,19 @@ class System:
         }
         return {k: v for k, v in vars(self).items() if k not in made}
 
-    def _equation(self, latex: bool = False) -> str:
-        """Return the equation as one writes it."""
-        above = written(self.numerator.terms, latex)
+    def __str__(self) -> str:
+        """Return numerator and denominator, or the equation, as one writes them."""
+        above = written(self.numerator.terms)
         if self.is_equation:
             return f"{above} = 0"
-        below = written(self.denominator.terms, latex)
-        if latex:
-            return above if below == "1" else rf"\frac{{{above}}}{{{below}}}"
+        below = written(self.denominator.terms)
         return above if below == "1" else f"[{above}] / [{below}]"
-
-    def __str__(self) -> str:
-        """Return numerator and denominator as one writes them."""
-        return self._equation()
 
     def __repr__(self) -> str:
         """Return a short text: the factors as given, or an open loop, or an equation."""
         if self.shown:
             return self.shown
-        text = self._equation()
+        text = str(self)
         if len(text) > _LONGEST_RATIONAL and self.is_rational:
             zeros, poles = (tuple(roots.tolist()) for roots in (self.zeros(), self.poles()))
             return f"Controller(zeros={zeros}, poles={poles}, gain={self.gain})"
@@ -850,10 +819,6 @@ class System:
         stated = f", without {self.at_zero} roots at s = 0" if self.at_zero else ""
         what = "equation" if self.is_equation else "open loop"
         return f"<{what} {text}{named}{stated}>"
-
-    def _repr_latex_(self) -> str | None:
-        text = self._equation(latex=True)
-        return f"${text}$" if len(text) <= 2 * _LONGEST_TEXT else None
 
     def __getattr__(self, name: str) -> Any:
         """Say what to write for a name of python-control that a system has not."""

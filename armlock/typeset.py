@@ -1,4 +1,4 @@
-"""Sums of polynomials, delays and parameters as one writes them, in plain text and in TeX."""
+"""Sums of polynomials, delays and parameters as one writes them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from flint import fmpq, fmpq_poly
 
 
-def written(terms: Mapping[Any, fmpq_poly], latex: bool = False) -> str:
+def written(terms: Mapping[Any, fmpq_poly]) -> str:
     """Return the terms of a sum, {(lag, names): polynomial}, as one writes them."""
     shown = []
     for (lag, names), p in sorted(
@@ -17,8 +17,8 @@ def written(terms: Mapping[Any, fmpq_poly], latex: bool = False) -> str:
     ):
         factors = [*names]
         if lag:
-            factors.append(_exponential(lag.time, latex))
-        power = _powers(p, latex)
+            factors.append(f"exp(-{fraction(lag.time)} s)")
+        power = _powers(p)
         several = sum(map(bool, p.coeffs())) > 1 and (factors or len(terms) > 1)
         if factors and power in ("1", "-1"):
             shown.append(power[:-1] + " ".join(factors))
@@ -37,22 +37,13 @@ def fraction(value: fmpq) -> str:
     return f"{Decimal(int(value.p)) / int(value.q):.5e}"
 
 
-def _exponential(time: fmpq, latex: bool) -> str:
-    """Return exp(-s theta) as text."""
-    exponent = f"-{fraction(time)} s"
-    return f"e^{{{exponent}}}" if latex else f"exp({exponent})"
-
-
-def _powers(p: fmpq_poly, latex: bool) -> str:
+def _powers(p: fmpq_poly) -> str:
     """Return a polynomial as text, in descending powers."""
     shown = []
     for k, c in reversed(list(enumerate(p.coeffs()))):
         if c:
-            digits, power = fraction(c), ("", "s", f"s^{{{k}}}" if latex else f"s^{k}")
-            symbol = power[min(k, 2)]
+            digits, symbol = fraction(c), ("", "s", f"s^{k}")[min(k, 2)]
             if symbol and digits in ("1", "-1"):
                 digits = digits[:-1]
-            if latex and "e" in digits:
-                digits = digits.replace("e", r" \cdot 10^{") + "}"
             shown.append(f"{digits} {symbol}".strip() if digits != "-" else f"-{symbol}")
     return " + ".join(shown).replace("+ -", "- ")

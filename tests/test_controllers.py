@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from fractions import Fraction
+from functools import partial
 
 import control
 import numpy as np
@@ -184,13 +185,15 @@ def test_a_pole_that_may_be_zero_is_asked_for_at_every_door():
             lambda k: return_difference([[1.0]], [k]),
             lambda k: determinant([[k]]),
         ):
-            with pytest.raises(ValueError, match=r"integrators=0, zeros=0.* or at_zero=0 of"):
+            with pytest.raises(
+                ValueError, match=r"more than 0 poles .*\(system, integrators=0"
+            ):
                 ask(system)
     matrices = TURNED.A, TURNED.B.ravel(), TURNED.C.ravel()
     with pytest.raises(ValueError, match=r"state_space\(..., integrators=0"):
         state_space(*matrices)
     for plant in (TURNED, (TURNED.A, TURNED.B, TURNED.C)):
-        with pytest.raises(ValueError, match="or at_zero=0 of an"):
+        with pytest.raises(ValueError, match=r"at_zero=0 of equation, .* return_difference"):
             return_difference(plant, [1 - delay(1.0)])
         assert unstable_roots(return_difference(plant, [1 - delay(1.0)], at_zero=1)) == 0
     meant = Loop(System.of(TURNED, integrators=1), "common", tau1=3.0, tau2=2.0)
@@ -202,10 +205,9 @@ def test_a_pole_that_may_be_zero_is_asked_for_at_every_door():
     for number in (2, 3):
         with pytest.raises(ValueError, match=f"^integrators must be .*, got {number}"):
             System.of(TURNED, integrators=number)
-    with pytest.raises(TypeError, match=r"^integrators is for a state space"):
-        System.of(((), (0.0,), 1.0), integrators=1)
-    with pytest.raises(TypeError, match=r"^zeros is for a state space"):
-        System.of(((), (0.0,), 1.0), zeros=1)
+    for ask in (partial(System.of, integrators=1), partial(System.of, zeros=1)):
+        with pytest.raises(TypeError, match=r"^integrators and zeros are for a state space"):
+            ask(((), (0.0,), 1.0))
 
 
 @pytest.mark.parametrize("integrators", [1, 2])
@@ -338,9 +340,52 @@ def test_a_transfer_function_that_was_rounded_is_asked_for():
     # Slow poles that somebody writes down are not in doubt, unless others are much faster.
     System.of(control.tf([1.0], np.poly([-1e-6, -1e-6, -3e4])))
     wide = control.tf([1], [1, 1e5, 1e-4])
-    with pytest.raises(ValueError, match="integrators=0, zeros=0"):
+    with pytest.raises(ValueError, match=r"\(system, integrators=0\)"):
         System.of(wide)
-    assert unstable_roots(System.of(System.of(wide, integrators=0))) == 0
+    assert unstable_roots(System.of(wide, integrators=0)) == 0
+
+
+@pytest.mark.parametrize("lead", [1e-14, 9e-16, -3e-13])
+def test_a_leading_coefficient_that_is_rounding_asks_nothing(lead):
+    for above, below in (
+        ([lead, 0.1, 0.0652, 2.485, 1.24], [1, 1, 1, 1, 1, 0]),
+        ([1, 1, 1, 1, 1, 0], [lead, 0.1, 0.0652, 2.485, 1.24]),
+    ):
+        k = System.of(control.tf(above, below))
+        assert k.numerator.order() + k.denominator.order() == 1
+        assert System.of(control.tf(above, below), integrators=k.denominator.order()) == k
+
+
+def test_the_way_out_of_each_refusal_is_taken():
+    """A message names only what is hidden, so that what it names is accepted."""
+    hidden = {
+        "integrators": control.tf([1, 2], [1, 1, 1e-17]),
+        "zeros": control.tf([1, 2, 1e-17], [1, 3, 0]),
+    }
+    for name, given in hidden.items():
+        with pytest.raises(ValueError, match=rf"System\.of\(system, {name}=0\)"):
+            System.of(given)
+    poles = [System.of(hidden["integrators"], integrators=k).denominator for k in (0, 1)]
+    assert [p.order() for p in poles] == [0, 1]
+    # With the pole that is exact there, a zero at s = 0 is left out.
+    degrees = [System.of(hidden["zeros"], zeros=k).numerator.degree for k in (0, 1)]
+    assert degrees == [2, 1]
+
+
+def test_fast_zeros_give_the_scale_of_a_slow_pole():
+    with pytest.raises(ValueError, match="more than 0 poles"):
+        System.of(control.tf([1, 0.2], [1, 1e-17]))
+
+
+def test_an_identified_integrator_is_asked_for_at_both_doors():
+    """A pole at 6e-14 rad/s beside 1 rad/s, as a fit by ERA leaves it."""
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    a = turn @ np.diag([6e-14, -0.4, -1.0]) @ turn.T
+    given = control.ss(a, turn @ np.ones((3, 1)), np.ones((1, 3)) @ turn.T, 0)
+    for system in (given, control.tf(given)):
+        with pytest.raises(ValueError, match="more than 0 poles"):
+            System.of(system)
+        assert System.of(system, integrators=1).denominator.order() == 1
 
 
 @pytest.mark.parametrize("pole", [1e-9, 1e-7])

@@ -235,9 +235,7 @@ def test_rounding_that_may_hide_an_integrator_is_told():
     parts = {0.0: a - np.diag([0.1, 0.2]), 1.0: np.diag([0.1, 0.2])}
     with pytest.raises(ValueError, match="rounding hides whether more than 0 roots"):
         state_space(parts)
-    assert unstable_roots(state_space(parts, integrators=1)) == BOUNDARY
     assert unstable_roots(state_space(parts, at_zero=1)) == 0
-    assert unstable_roots(state_space(parts, integrators=1, at_zero=1)) == 0
     assert unstable_roots(state_space({0: [[-1.0]], 1: [[1.0]]})) == BOUNDARY
     # Two tanks, the flow from one to the other late: nothing leaves them.
     still, late = np.diag([-0.1, -0.3 - 0.2]), [[0.0, 0.3 + 0.2], [0.1, 0.0]]
@@ -248,8 +246,10 @@ def test_rounding_that_may_hide_an_integrator_is_told():
         state_space(tanks, b, c)
     meant = state_space(tanks, b, c, integrators=1)
     assert unstable_roots(gain * meant * (1 - delay(3.0))) == 0
-    with pytest.raises(ValueError, match=r"integrators must be the number of poles .* got 1"):
-        state_space(VERHEYDEN, integrators=1)
+    with pytest.raises(ValueError, match=r"at_zero must be the number of roots .* got 1"):
+        state_space(VERHEYDEN, at_zero=1)
+    with pytest.raises(TypeError, match="integrators and zeros are for b and c"):
+        state_space(VERHEYDEN, integrators=0)
 
 
 @pytest.mark.parametrize(
@@ -297,8 +297,8 @@ PAIR = control.tf([[[1], [2]], [[0], [3]]], [[[1, 1], [1, 4]], [[1], [1, 3]]])
         lambda: return_difference((PLANT, PLANT.B, PLANT.C), [1]),
     ],
 )
-def test_a_system_in_place_of_matrices_is_refused_with_what_to_write(make):
-    with pytest.raises(TypeError, match=r"^[ab] must hold numbers, got a .*System\.of\(p\)"):
+def test_a_system_in_place_of_matrices_is_refused(make):
+    with pytest.raises(TypeError, match=r"^[ab] must hold real numbers, got a"):
         make()
 
 
@@ -311,7 +311,7 @@ def test_what_to_write_for_systems_of_python_control_is_right():
         "plant": lambda p: return_difference(p, [1, 1]),
         "controllers": lambda p: return_difference([[1, 0], [0, 1]], p),
     }.items():
-        with pytest.raises(TypeError, match=rf"^{name} must be .* rows, .* write \[\[p\[i, k"):
+        with pytest.raises(TypeError, match=rf"^{name} must be a list of rows of systems"):
             make(PAIR)
     entries = [[PAIR[i, k] for k in range(PAIR.ninputs)] for i in range(PAIR.noutputs)]
     # (s + 2)(s + 6), and the mode of the entry that closes no loop.
@@ -478,7 +478,7 @@ def test_weights_in_decimals_leave_the_agreement_to_be_stated():
         lambda **stated: equation(s + 0.1 * z + 0.2 * z - 0.3 * z, **stated),
         lambda **stated: equation(s + Fraction(0.3) * z - (0.1 + Fraction(0.2)) * z, **stated),
     ):
-        with pytest.raises(ValueError, match=r"rounding hides .* or at_zero=0 of an equation"):
+        with pytest.raises(ValueError, match=r"rounding hides .* at_zero=0 of equation, "):
             make()
         meant = make(at_zero=1)
         assert meant.numerator.order() == 1

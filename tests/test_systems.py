@@ -305,8 +305,6 @@ def test_what_is_improper_zero_or_too_large_is_called_so():
     for pair in (control.series(lag, k), control.parallel(k, lag), control.series(k, k)):
         assert isinstance(pair, System)
     assert complex(control.series(lag, k)(1j)) == pytest.approx(complex(lag(1j)) * k(1j))
-    with pytest.raises(ValueError, match=r"^power must be at most 1000000 in size"):
-        delay(1.0) ** 10**400
     with pytest.raises(ValueError, match=r"^system must be at most 1\.8e308 in size"):
         2**1330 * delay(1.0)
 
@@ -361,7 +359,6 @@ def test_an_equation_is_no_open_loop():
     assert repr(forced).startswith("<equation ")
     assert repr(forced).endswith(" = 0, parameters k>")
     assert repr(1 / s).startswith("<open loop ")
-    assert "\\frac" in str((1 / (s + 1))._repr_latex_())
 
 
 # delays have identity ------------------------------------------------

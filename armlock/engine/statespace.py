@@ -11,7 +11,7 @@ it is stated how many poles and zeros are meant to be at s = 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import flint
@@ -20,14 +20,10 @@ from flint import fmpq, fmpq_poly
 from armlock.checks import whole_number
 from armlock.engine.polynomials import Polynomial, exact, polynomial
 
-#: What rounding makes of a determinant: at most this share of sum |a_ij cofactor_ij|. It covers
-#: all changes of coordinates that were drawn, of two to five states.
-ROUNDED = fmpq(512, 2**53)
-#: What rounding makes of a root of a polynomial that was multiplied out: this share of the
-#: largest root. python-control makes as much of state spaces in coordinates of some condition.
-MULTIPLIED = fmpq(1, 2**39)
-# Bounds are computed of so many of the lowest coefficients of a polynomial.
-_ASKED = 3
+#: What rounding makes of a coefficient: at most this share of the sizes of what was summed. It
+#: covers changes of coordinates, and transfer functions that python-control makes of state
+#: spaces that are not badly scaled.
+ROUNDED = fmpq(1, 2**39)
 # What is counted by each number that may be stated.
 _COUNTED = {"integrators": "poles", "zeros": "zeros", "at_zero": "roots"}
 
@@ -74,11 +70,10 @@ def settled(
         rounding, or rounding hides the next coefficient.
     """
     stated = whole_number(name, 0 if number is None else number, 0)
-    size = len(series[0].coefficients)
+    size, is_root = len(series[0].coefficients), name == "at_zero"
     sure = [any(one.is_sure(k) for one in series) for k in range(size)]
     zero = [not any(one.coefficients[k] for one in series) for k in range(size)]
     most = sure.index(True) if any(sure) else size
-    is_root = name == "at_zero"
     if stated > most or (number is not None and not is_root and zero[stated]):
         made = f", of which clearing denominators makes {cleared}" if is_root else ""
         raise ValueError(
@@ -93,12 +88,14 @@ def settled(
     if number != 0 and after < size and not zero[after]:
         first = series[0]
         if (first.coefficients[after] and not first.is_sure(after)) or not sure[after]:
+            calls = "System.of(system, {0}), state_space(..., {0})"
+            if is_root:
+                calls = "{0} of equation, determinant, return_difference or state_space"
             raise ValueError(
                 f"rounding hides whether more than {after} {_COUNTED[name]} are at s = 0: "
-                "state how many are meant, 0 if the numbers hold as they are, by "
-                "System.of(system, integrators=0, zeros=0), state_space(..., "
-                "integrators=0, zeros=0), or at_zero=0 of an equation, determinant or "
-                "return_difference; or give its factors, Controller(zeros, poles, gain)"
+                f"state how many, 0 if the numbers hold as they are, "
+                f"{calls.format(name + '=0')}; or give its factors, "
+                "Controller(zeros, poles, gain)"
             )
     return stated
 
@@ -124,11 +121,16 @@ def of_matrices(
     if not len(a):
         return polynomial([d]), polynomial([1])
     first, column, row, through = _matrix(a), _matrix(b), _matrix(c), exact(d)
-    coefficients, adjugates = _cofactors(first)
-    below = fmpq_poly(coefficients)
+    below = fmpq_poly(first.charpoly().coeffs())
     above = (first - column * row).charpoly() - below + through * below
-    bounds = _bounds(below, adjugates, first), _bounds_of_zeros(a, b, c, d, above)
-    return _quotient(above, below, through, (integrators, zeros), bounds)
+    bounds = _bounds(first, len(a), below)
+    moved = _rounding("integrators", integrators, below, bounds)
+    # The numerator is the determinant of [[s - A, B], [-C, D]].
+    whole = _matrix(bordered(a, [-x for (x,) in b], c[0], -d))
+    bounds = _bounds(whole, len(a), above) if above else []
+    # What goes through directly stays as it is.
+    above, below = above - through * moved, below - moved
+    return above - _rounding("zeros", zeros, above, bounds), below
 
 
 def of_coefficients(
@@ -142,23 +144,14 @@ def of_coefficients(
         As `settled`.
     """
     above, below = polynomial(above), polynomial(below)
-    through = above[below.degree()] / below.leading_coefficient()
-    bounds = _bounds_of_product(Polynomial.of(below)), _bounds_of_product(Polynomial.of(above))
-    return _quotient(above, below, through, (integrators, zeros), bounds)
-
-
-def _quotient(
-    above: fmpq_poly,
-    below: fmpq_poly,
-    through: fmpq,
-    numbers: tuple[int | None, int | None],
-    bounds: tuple[Sequence[fmpq], Sequence[fmpq]],
-) -> tuple[fmpq_poly, fmpq_poly]:
-    """Return numerator and denominator with as many poles and zeros at s = 0 as are stated."""
-    moved = _rounding("integrators", numbers[0], below, bounds[0])
-    # What goes through directly stays as it is.
-    above, below = above - through * moved, below - moved
-    return above - _rounding("zeros", numbers[1], above, bounds[1]), below
+    # The leading coefficient of the one of lower degree may be rounding as well.
+    degree = max(above.degree(), below.degree())
+    longer = [p for p in (above, below) if p.degree() == degree]
+    roots = [abs(root) for p in longer for root in Polynomial.of(p).roots]
+    largest = exact(max(roots, default=0.0))
+    moved = _rounding("integrators", integrators, below, _bounds_of_product(below, largest))
+    zero = _rounding("zeros", zeros, above, _bounds_of_product(above, largest))
+    return above - zero, below - moved
 
 
 def _rounding(name: str, number: int | None, p: fmpq_poly, bounds: Sequence[fmpq]) -> fmpq_poly:
@@ -166,8 +159,7 @@ def _rounding(name: str, number: int | None, p: fmpq_poly, bounds: Sequence[fmpq
     if not p:
         return p
     c = p.coeffs()
-    lowest = Lowest(c, [*bounds, *[fmpq(0)] * len(c)])
-    return fmpq_poly(c[: settled(name, number, [lowest])])
+    return fmpq_poly(c[: settled(name, number, [Lowest(c, bounds)])])
 
 
 def _matrix(rows: Any) -> Any:
@@ -180,70 +172,37 @@ def bordered(block: Any, column: Any, row: Any, corner: Any) -> list[list[Any]]:
     return [*([*r, v] for r, v in zip(block, column, strict=True)), [*row, corner]]
 
 
-def _cofactors(matrix: Any) -> tuple[list[fmpq], list[Any]]:
-    """Return the coefficients of det(s - A), and those of the adjugate of s - A.
+def _bounds(matrix: Any, states: int, value: fmpq_poly) -> list[fmpq]:
+    """Return what rounding makes of the coefficients of det(s - matrix).
 
-    By the recursion of Faddeev and Leverrier, P_(k-1) = A P_k + c_k.
+    Here s stands at the first places of the diagonal, one for each state. The derivative by an
+    entry is its cofactor. With Y the inverse at a point where the determinant is not zero, and
+    d its coefficients around this point, the adjugate is B_k = Y (d_k - B_(k-1)).
     """
-    coefficients = matrix.charpoly().coeffs()
-    n = len(coefficients) - 1
-    unit = flint.fmpq_mat(n, n, [int(i == k) for i in range(n) for k in range(n)])
-    found = [unit]
-    for c in coefficients[n - 1 : 0 : -1]:
-        found.append(matrix * found[-1] + c * unit)
-    return coefficients, found[::-1]
-
-
-def _bounds(value: fmpq_poly, adjugates: Iterable[Any], weights: Any) -> list[fmpq]:
-    """Return what rounding makes of the lowest coefficients of a determinant.
-
-    The derivative by an entry is its cofactor. The last one is larger than rounding.
-    """
-    found: list[fmpq] = []
-    for k, adjugate in enumerate(adjugates):
-        pairs = zip(weights.entries(), adjugate.transpose().entries(), strict=True)
-        found.append(ROUNDED * sum((abs(x * y) for x, y in pairs), fmpq(0)))
-        if value[k] and abs(value[k]) >= found[k]:
-            break
-    return found
-
-
-def _bounds_of_zeros(a: Any, b: Any, c: Any, d: float, value: fmpq_poly) -> list[fmpq]:
-    """Return what rounding may make of the lowest coefficients of the numerator.
-
-    It is the determinant of [[s - A, B], [-C, D]], whose adjugate is interpolated.
-    """
-    if not value:
-        return []
-    n = len(a)
-    turned, column, row = [[-x for x in row] for row in a], [x for (x,) in b], c[0]
-    matrix = _matrix(bordered(turned, column, [-x for x in row], d))
-    size = range(n + 1)
-    unit = flint.fmpq_mat(n + 1, n + 1, [int(i == k < n) for i in size for k in size])
-    points = [k for k in range(1, 2 * n + 2) if value(k)][: n + 1]
-    inverse = flint.fmpq_mat(n + 1, n + 1, [k**i for k in points for i in size]).inv()
-    known = [(unit * k + matrix).inv() * value(k) for k in points]
-    adjugates = (
-        sum((m * inverse[i, j] for j, m in enumerate(known)), 0 * matrix) for i in size
+    size = range(matrix.nrows())
+    unit, places = (
+        flint.fmpq_mat(len(size), len(size), [int(i == k < n) for i in size for k in size])
+        for n in (len(size), states)
     )
-    return _bounds(value, adjugates, matrix)
+    start = next(k for k in range(len(size) + 1) if value(k))
+    inverse, around = (places * start - matrix).inv(), value(fmpq_poly([start, 1]))
+    adjugates = [around[0] * inverse]
+    for k in range(1, states + 1):
+        adjugates.append(inverse * (around[k] * unit - places * adjugates[-1]))
+    for first in range(states):
+        for k in range(states - 1, first - 1, -1):
+            adjugates[k] -= start * adjugates[k + 1]
+    pairs = (zip(matrix.entries(), b.transpose().entries(), strict=True) for b in adjugates)
+    return [ROUNDED * sum((abs(x * y) for x, y in each), fmpq(0)) for each in pairs]
 
 
-def _bounds_of_product(given: Polynomial) -> list[fmpq]:
-    """Return what rounding makes of the lowest coefficients of a polynomial multiplied out.
+def _bounds_of_product(p: fmpq_poly, largest: fmpq) -> list[fmpq]:
+    """Return what rounding makes of the coefficients of a polynomial multiplied out.
 
-    Its roots are rounded by a share of the largest one, which python-control does to state
-    spaces. A bound is zero where so many roots are not next to s = 0.
+    Where all roots are rounded by the share u of the largest one r, a root at zero leaves
+    u r c_1 of c_0. Where c_1 is rounding too, two of them leave u r^2 c_2, and so on.
     """
-    p, largest = given.exact, exact(max(map(abs, given.roots), default=0.0))
-    found = []
-    for first in range(_ASKED):
-        bounds = [fmpq(0)]
-        for number in range(first + 1, min(first + _ASKED, p.degree() + 1)):
-            lead = MULTIPLIED * abs(p[number])
-            bounds = [lead * largest ** (number - k) for k in range(first, number)]
-            if all(abs(p[k]) < x for k, x in enumerate(bounds, first)):
-                break
-            bounds = [fmpq(0)]
-        found.append(bounds[0])
-    return found
+    bounds = [fmpq(0)]
+    for c in map(abs, p.coeffs()[:0:-1]):
+        bounds.append(largest * (bounds[-1] if c < bounds[-1] else ROUNDED * c))
+    return bounds[::-1]
