@@ -1025,6 +1025,19 @@ def test_undo_goes_back_through_the_address(opened):
     assert page.get_by_label("Zeros", exact=True).is_visible()
 
 
+def test_a_slider_that_goes_on_moving_is_one_step_of_undo(opened):
+    page = opened()
+    before = page.get_by_label("Gain", exact=True).input_value()
+    for _ in range(3):
+        page.get_by_role("slider", name="Gain factor").press("ArrowRight")
+    assert page.get_by_label("Gain", exact=True).input_value() != before
+    press(page, "Undo")
+    page.wait_for_function(
+        f"() => document.querySelector('pre').textContent.includes('gain={before},')"
+    )
+    assert page.get_by_role("button", name="Undo").is_disabled()
+
+
 #: Where the s-plane stands in the document, in each frame from now on.
 STANDS = """selector => {
     window.stands = [];

@@ -271,7 +271,8 @@ const armlockDraw = (function () {
         pen.drawImage(this.picture.picture, px(u0), py(v1), px(u1) - px(u0), py(v0) - py(v1));
         pen.globalAlpha = 1;
       }
-      if (this.ghost) this.trace(pen, this.ghost, colours, true);
+      // Its turns may fill the plane, and the regions show through.
+      if (this.ghost) ghost(pen, colours.text, () => this.trace(pen, this.ghost, colours, true), 0.3);
       if (this.curve) this.trace(pen, this.curve, colours, false);
       if (this.half < 1e-4) {
         pen.strokeStyle = colours.line;
@@ -355,11 +356,10 @@ const armlockDraw = (function () {
       return stable && other;
     }
 
-    /* The D-curve where it bounds the stable region, coloured by the frequency; a pinned one is dashed. */
+    /* The D-curve where it bounds the stable region, coloured by the frequency; all of a pinned one. */
     trace(pen, { curve, line, range }, colours, pinned) {
       const { px, py } = this, [first, last] = range;
       pen.lineWidth = 1.2;
-      pen.setLineDash(pinned ? [4, 4] : []);
       pen.strokeStyle = colours.text;
       if (line) {
         const [a, b, c] = line, { x0, x1, y0, y1 } = this.box;
@@ -392,7 +392,6 @@ const armlockDraw = (function () {
         down = true;
       }
       pen.stroke();
-      pen.setLineDash([]);
     }
 
     at(event) {

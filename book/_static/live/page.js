@@ -520,8 +520,8 @@ function armlockPages() {
       code.textContent = python(live.spec, live.kept, unit);
       orbit.href = `in_orbit.html${hash}`;
       if (quiet) return;
-      // A point that goes on moving is one step, and so is a text that is being typed; another view is none.
-      const further = step && hash !== location.hash && !(step === before && /^(point|typed)/.test(step));
+      // A point or a slider that goes on moving is one step, and so is a text that is being typed; another view is none.
+      const further = step && hash !== location.hash && !(step === before && /^(point|typed|slid)/.test(step));
       before = step || before;
       const write = () => {
         history[further ? "pushState" : "replaceState"]({ depth }, "", hash);
@@ -705,13 +705,13 @@ function armlockPages() {
     const presets = preset.querySelector("select");
     const gain = slider(id("factor"), "Gain factor:", -2, 2, 0, v => say(10 ** v), (v, moving) => {
       fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
-      take("gain", { moving, dragged: true });
+      take("gain", { moving, dragged: true, step: "slid gain" });
     });
     // The left end is no dead time.
     const least = -7, late = v => v > least ? +(10 ** v).toPrecision(3) : 0;
     const dead = slider(id("dead"), "Dead time:", least, 1, least, v => time(late(v)), (v, moving) => {
       fields.delay.value = time(late(v));
-      take("delay", { moving, dragged: true });
+      take("delay", { moving, dragged: true, step: "slid delay" });
     });
     const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
     const paste = field("pasted", "Paste a controller from MATLAB, Python or Julia", true);
