@@ -22,7 +22,7 @@ from armlock import (
     stable_half_differences,
     unstable_roots,
 )
-from armlock.orbits import SPEED_OF_LIGHT, kepler
+from armlock.orbits import SPEED_OF_LIGHT, from_table, kepler
 from armlock.sensors import dual
 from tests import draws
 
@@ -201,7 +201,7 @@ def test_frozen_rates_are_those_of_simulations_with_moving_delays(chapter):
 
 
 PAGE = (ROOT / "book" / "in_orbit.md").read_text("utf-8")
-*BLOCKS, LISAORBITS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+*BLOCKS, LISAORBITS, OEM = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 
 
 def page(**changes):
@@ -228,6 +228,48 @@ def test_orbits_of_lisaorbits_are_read_as_the_page_shows():
     t = np.linspace(1e3, 3e7, 50)
     off = np.subtract(names["orbit"].round_trips(t), kepler().round_trips(t))
     assert np.abs(off).max() < 1e-10
+
+
+OEM_HEADER = """CCSDS_OEM_VERS = 2.0
+CREATION_DATE = 2026-01-01T00:00:00
+ORIGINATOR = US
+META_START
+OBJECT_NAME = LISA
+OBJECT_ID = 1
+CENTER_NAME = SUN
+REF_FRAME = EME2000
+TIME_SYSTEM = TCB
+START_TIME = {}
+STOP_TIME = {}
+META_STOP
+"""
+
+
+def test_files_of_oem_are_read_as_the_page_shows(tmp_path, monkeypatch):
+    """In two segments, with other borders for each of the files."""
+    pytest.importorskip("oem")
+    monkeypatch.chdir(tmp_path)
+    t = np.arange(0.0, 60 * DAY, DAY)
+    epochs = np.datetime64("2035-01-01T00:00:29") + (t * 1e9).astype("timedelta64[ns]")
+    for k, path in enumerate(kepler()._paths):
+        states = np.hstack((path(t, 0), path(t, 1))) / 1e3
+        lines = [
+            " ".join([str(epoch), *(f"{value:.17g}" for value in state)])
+            for epoch, state in zip(epochs, states, strict=True)
+        ]
+        border = 10 * (k + 1)
+        parts = (epochs[: border + 1], lines[: border + 1]), (epochs[border:], lines[border:])
+        first, second = (
+            "\n".join([OEM_HEADER.format(of[0], of[-1]), *rows, ""]) for of, rows in parts
+        )
+        whole = first + second[second.index("META_START") :]
+        Path(f"lisa{k + 1}.oem").write_text(whole, "utf-8")
+    names: dict[str, Any] = {"np": np, "from_table": from_table}
+    exec(OEM, names)
+    orbit = names["orbit"]
+    when = np.linspace(*orbit.span, 200)
+    off = np.subtract(orbit.round_trips(when, 2), kepler().round_trips(when, 2))
+    assert np.abs(off).max() < 5e-11
 
 
 def test_the_page_gives_the_range_and_the_days_of_the_chapter(chapter, weak):

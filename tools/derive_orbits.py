@@ -13,8 +13,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from oem import OrbitEphemerisMessage
 
 from armlock import orbits
+from armlock.checks import FloatArray
 
 DATA = Path(orbits.__file__).parent / "data"
 ORIGINAL = {
@@ -33,19 +35,26 @@ HEADER = """\
 """
 
 
+def read(file: Path) -> tuple[FloatArray, FloatArray]:
+    """Return the times of states in s, and the positions in m."""
+    states = OrbitEphemerisMessage.open(file).states
+    seconds = [(state.epoch - states[0].epoch).to_value("s") for state in states]
+    # Where a segment ends and the next begins, the epoch stands twice.
+    times, kept = np.unique(seconds, return_index=True)
+    return times, 1e3 * np.array([state.position for state in states])[kept]
+
+
 def main() -> None:
     """Write both tables."""
     for name, original in ORIGINAL.items():
         files = [Path(sys.argv[1]) / f"{name}_lisa{k}.oem" for k in (1, 2, 3)]
-        read = orbits.read_oem(files)
-        _, epochs, _ = orbits._read_oem(files[0])
-        places = np.hstack([orbits._read_oem(file)[2] for file in files])
-        times = (epochs - epochs[0]) / np.timedelta64(1, "s")
+        (times, one), (_, two), (_, three) = (read(file) for file in files)
+        places = np.hstack((one, two, three))
         lines = [
             ",".join([f"{time:.6f}", *(f"{value:.0f}" for value in row)])
             for time, row in zip(times, places, strict=True)
         ]
-        text = HEADER.format(name=name, original=original, epoch=read.epoch)
+        text = HEADER.format(name=name, original=original, epoch=orbits._ESA[name])
         text += "\n".join(lines) + "\n"
         # Without a date, so that the same files give the same bytes.
         file = DATA / f"esa_{name}.csv.gz"
