@@ -73,27 +73,25 @@ def test_the_budget_is_held_against_a_requirement_and_draws_itself():
     plt.close()
 
 
-def test_the_budget_takes_other_levels_and_names_its_own():
+def test_the_budget_takes_another_laser_and_names_its_own():
     f = np.geomspace(1e-3, 1.0, 20)
     usual = noise_budget(FLIGHT, f)
     assert usual.free == pytest.approx(3e4 / f, rel=1e-12)
     assert "30 kHz/sqrt(Hz) at 1 Hz" in (noise_budget.__doc__ or "")
     laser = LaserNoise(1, 200.0)
-    other = noise_budget(FLIGHT, f, laser=laser, shot=3e-5, clock=1.2e-12)
-    shares: dict[str, Any] = {"laser": laser.asd(f) * f / 3e4, "shot": 3.0, "clock": 0.5}
-    for name, share in shares.items():
-        assert other.sources[name] == pytest.approx(share * usual.sources[name], rel=1e-12)
+    other = noise_budget(FLIGHT, f, laser=laser.asd)
+    share = laser.asd(f) * f / 3e4
+    assert other.sources["laser"] == pytest.approx(share * usual.sources["laser"], rel=1e-12)
     assert np.array_equal(other.sources["motion"], usual.sources["motion"])
-    by_function = noise_budget(FLIGHT, f, laser=lambda x: 30.0 / x)
-    assert by_function.sources["laser"] == pytest.approx(other.sources["laser"], rel=1e-6)
-    for wrong in (lambda x: -1.0 / x, lambda x: 1.0, lambda x: np.nan * x):
+    wrong: list[Any] = [lambda _: 1.0, lambda x: np.nan * x]
+    for one in wrong:
         with pytest.raises(ValueError, match=r"^laser\(frequency\) must "):
-            noise_budget(FLIGHT, f, laser=wrong)
+            noise_budget(FLIGHT, f, laser=one)
 
 
 def test_unstable_loops_have_no_noise_budget():
     """Their responses at s = j omega look like those of a stable loop."""
-    with pytest.raises(ValueError, match=r"^loop must be stable .* gives 36"):
+    with pytest.raises(ValueError, match=r"^loop must be stable, but it has 36 unstable roots"):
         noise_budget(DualArm(gain=10.0).replace(delay=1.0), [1e-3])
     # A root at s = 0 that cancels in L is not the loop's.
     assert noise_budget(SingleArm(1.0), [1e-3]).total[0] > 0.0
@@ -181,10 +179,10 @@ def test_pulling_is_what_the_method_of_steps_gives(seed):
 
 def test_what_an_unstable_loop_does_is_no_pulling():
     turned = Loop(FLIGHT.controller, modified_dual(33.6, -0.255), FLIGHT.tau1, FLIGHT.tau2)
-    with pytest.raises(ValueError, match=r"^loop must be stable .* unstable_roots gives 38"):
+    with pytest.raises(ValueError, match=r"^loop must be stable, but it has 38 unstable roots"):
         pulling(turned, 1.0)
     # With any dead time its neutral root chain is not confined.
-    with pytest.raises(ValueError, match=r"^loop must be stable .* unstable_roots gives -2"):
+    with pytest.raises(ValueError, match=r"^loop must be stable, but it has no confined chain"):
         largest_pulling(paper_loop(delay=1e-6), common=(1.0, 0.0, 0.0))
 
 

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import FloatArray, axis, finite_series, not_negative, positive_array
+from armlock.checks import FloatArray, axis, finite_series, positive_array
 from armlock.loops import Loop
-from armlock.performance.transfer import require_stable, responses
+from armlock.performance.transfer import require_stable_loop, transfer
 from armlock.tables import Shown, Table, number
 
 if TYPE_CHECKING:
@@ -38,9 +38,6 @@ class Levels(NamedTuple):
         Motion of a spacecraft along one arm in cycles/sqrt(Hz), at low frequency.
     motion_corner : float
         Corner in Hz of the roll-off 1/sqrt(1 + (f / corner)^4) of that motion.
-    free_running : float
-        Noise of a free-running laser at 1 Hz in Hz/sqrt(Hz); it falls as 1/f. The paper's is
-        `armlock.paper.LASER_NOISE`.
     """
 
     shot: float = 10e-6
@@ -48,7 +45,6 @@ class Levels(NamedTuple):
     beat_notes: tuple[float, float] = (15e6, -14e6)
     motion: float = 2.5e-3
     motion_corner: float = 0.3
-    free_running: float = 3e4
 
 
 #: The white paper's levels, which cannot be changed.
@@ -57,7 +53,7 @@ LEVELS: Final = Levels()
 
 def free_running(frequency: FloatArray) -> FloatArray:
     """Return the noise of a free-running laser in Hz/sqrt(Hz): 30 kHz at 1 Hz, as 1/f."""
-    return LEVELS.free_running / frequency
+    return 3e4 / frequency
 
 
 def tdi_capability(frequency: FloatArray) -> FloatArray:
@@ -155,30 +151,11 @@ class NoiseBudget(Shown):
         return ax
 
 
-def _density(laser: Any, f: FloatArray) -> FloatArray:
-    """Return the noise of a free laser in Hz/sqrt(Hz), or raise."""
-    density = getattr(laser, "asd", laser)
-    if not callable(density):
-        raise TypeError(
-            "laser must be a function of the frequency in Hz, or have such a method asd, "
-            f"got {laser!r:.200}"
-        )
-    found = finite_series("laser(frequency)", density(f))
-    if found.shape != f.shape or (found < 0.0).any():
-        raise ValueError(
-            "laser(frequency) must hold no negative number and have the shape of frequency, "
-            f"{f.shape}, got shape {found.shape} and {found.min(initial=0.0)} as the least"
-        )
-    return found
-
-
 def noise_budget(
     loop: Loop,
     frequency: npt.ArrayLike,
     *,
-    laser: Any = free_running,
-    shot: float = LEVELS.shot,
-    clock: float = LEVELS.clock,
+    laser: Callable[[FloatArray], FloatArray] = free_running,
 ) -> NoiseBudget:
     r"""Compute what noise is left on the locked laser, at c1 = c2 = 1.
 
@@ -196,7 +173,7 @@ def noise_budget(
 
         N_{S,k} &= \text{two links of the shot noise} , \\
         N_{C,k} &= \Delta_k \frac{y_0 + y_k}{2\pi f} , \quad
-        y = \text{clock} \cdot f^{-1/2} , \\
+        y = y_C f^{-1/2} , \\
         N_{X,k} &= X_0 \left( 1 + e^{-s\tau_k} \right) + 2 X_k .
 
     The clock and the motion of the spacecraft with the laser, index 0, act on both arms.
@@ -207,15 +184,11 @@ def noise_budget(
         The loop.
     frequency : array_like of float, one-dimensional
         In Hz, positive.
-    laser : callable, or object with a method asd, optional
+    laser : callable, optional
         Noise of the free laser in Hz/sqrt(Hz) as a function of the frequency in Hz, for
-        instance a `LaserNoise`. By default 30 kHz/sqrt(Hz) at 1 Hz, falling as 1/f. A measured
-        table makes such a function: ``lambda f: numpy.interp(f, frequencies, densities)``.
-    shot : float, optional
-        Shot noise of one link in cycles/sqrt(Hz), 1e-5 by default.
-    clock : float, optional
-        Fractional frequency noise of a clock at 1 Hz in 1/sqrt(Hz), 2.4e-12 by default. It
-        falls as 1/sqrt(f).
+        instance the method ``asd`` of a `LaserNoise`. By default 30 kHz/sqrt(Hz) at 1 Hz,
+        falling as 1/f. A measured table makes such a function:
+        ``lambda f: numpy.interp(f, frequencies, densities)``. The other levels are `Levels`.
 
     Returns
     -------
@@ -227,8 +200,7 @@ def noise_budget(
     ------
     TypeError, ValueError
         If `loop` is no `Loop` or not stable, the frequencies are not positive and
-        one-dimensional, `laser` is no function that returns densities, or another level is
-        negative.
+        one-dimensional, or `laser` does not return a density for each.
 
     References
     ----------
@@ -245,19 +217,17 @@ def noise_budget(
 
     >>> from armlock import LaserNoise
     >>> paper = LaserNoise(seed=1, sample_rate=200.0)
-    >>> left = noise_budget(flight_loop(), [3e-3], laser=paper).sources["laser"]
+    >>> left = noise_budget(flight_loop(), [3e-3], laser=paper.asd).sources["laser"]
     >>> print(f"{left[0]:.2f} Hz/sqrt(Hz)")
     0.11 Hz/sqrt(Hz)
 
     As a table: ``pandas.DataFrame(found.sources, index=found.frequency)``.
     """
     f = axis("frequency", positive_array("frequency", frequency))
-    free = _density(laser, f)
-    shot, clock = not_negative("shot", shot), not_negative("clock", clock)
-    require_stable(loop)
+    free = finite_series("laser(frequency)", laser(f))
+    require_stable_loop(loop)
     s = 2j * np.pi * f
-    found = responses(loop, s, ("laser", "arm 1", "arm 2"))
-    arms = np.array([found["arm 1"], found["arm 2"]])
+    arms = np.array([transfer(loop, "arm 1", s), transfer(loop, "arm 2", s)])
     beats, tau = np.array(LEVELS.beat_notes)[:, None], np.array([[loop.tau1], [loop.tau2]])
     # An arm's noise in cycles is turned into a frequency by 2 pi f.
     motion = LEVELS.motion * np.abs(s) / np.sqrt(1.0 + (f / LEVELS.motion_corner) ** 4)
@@ -268,9 +238,9 @@ def noise_budget(
         return np.asarray(np.hypot(together, np.linalg.norm(separate * arms, axis=0)))
 
     locked = {
-        "laser": np.abs(found["laser"]) * free,
-        "shot": np.sqrt(2.0) * shot * np.abs(s) * through(0.0, 1.0),
-        "clock": clock / np.sqrt(f) * through(beats, beats),
+        "laser": np.abs(transfer(loop, "laser", s)) * free,
+        "shot": np.sqrt(2.0) * LEVELS.shot * np.abs(s) * through(0.0, 1.0),
+        "clock": LEVELS.clock / np.sqrt(f) * through(beats, beats),
         "motion": motion * through(1.0 + np.exp(-s * tau), 2.0),
     }
     return NoiseBudget(f, locked, tdi_capability(f), free)

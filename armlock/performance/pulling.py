@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import ComplexArray, FloatArray, finite_series, positive_array
+from armlock.checks import FloatArray, finite_series, positive_array
 from armlock.loops import Loop
-from armlock.performance.transfer import require_stable, responses
+from armlock.performance.transfer import require_stable_loop, transfer
 
 _SOURCES = "common", "differential"
 # Times of which half and one in eight more are kept: a series that begins at zero.
@@ -103,7 +103,7 @@ def pulling(
     >>> print(f"{pulling(flight_loop(), 4 * day, common=(1e3, 0.0, 0.0)) / 1e6:.3f} MHz")
     0.074 MHz
     """
-    require_stable(loop)
+    require_stable_loop(loop)
     t = positive_array("time", time)
     errors = _errors(common, differential)
     found = np.empty((*errors.shape[:-2], *t.shape))
@@ -144,7 +144,7 @@ def largest_pulling(
         The highest sample of series that resolve 2e-6 to 2e-5 of the time. It is not
         certified.
     """
-    require_stable(loop)
+    require_stable_loop(loop)
     errors = _errors(common, differential)
     size, at = np.zeros(errors.shape[:-2]), np.zeros(errors.shape[:-2])
     duration = _EARLIEST
@@ -186,8 +186,7 @@ class _Response:
         self.s = self.shift + 1j * omega
         smooth = np.exp(-0.5 * (omega * _SMOOTHED * self.step) ** 2)
         with np.errstate(all="ignore"):
-            found = responses(loop, self.s, _SOURCES)
-        self.found: list[ComplexArray] = [smooth * found[source] for source in _SOURCES]
+            self.found = [smooth * transfer(loop, source, self.s) for source in _SOURCES]
 
     @np.errstate(all="ignore")
     def to(self, errors: FloatArray) -> tuple[FloatArray, float]:

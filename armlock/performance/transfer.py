@@ -6,13 +6,12 @@ laser pulling are computed from these responses.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy.typing as npt
 
 from armlock.checks import ComplexArray
+from armlock.engine.functions import common_zeros
 from armlock.loops import Loop, checked_loop
-from armlock.stability.counts import unstable_roots
+from armlock.stability.counts import decided, require_stable
 
 
 def transfer(
@@ -61,28 +60,8 @@ def transfer(
     return checked_loop(loop).response(source)(s)
 
 
-def responses(loop: Loop, s: npt.ArrayLike, sources: Sequence[str]) -> dict[str, ComplexArray]:
-    """Evaluate the responses to several inputs, as `transfer` gives them one by one.
-
-    The response to "laser" is always among them. Each is shaped like `s`, in rad/s.
-    """
-    # The loop is evaluated once for all of them.
-    sensitivity = 1.0 / (1.0 + checked_loop(loop)(s))
-    found = {
-        source: -path(s) * sensitivity
-        for source, path in loop.paths.items()
-        if source in sources
-    }
-    return {"laser": sensitivity, **found}
-
-
-def require_stable(loop: Loop) -> None:
-    """Raise unless all roots of a closed loop lie in the open left half-plane.
-
-    The response of an unstable loop at s = j omega looks like that of a stable one.
-    """
-    count = unstable_roots(checked_loop(loop), 1.0, 1.0)
-    if count != 0:
-        raise ValueError(
-            f"loop must be stable at c1 = c2 = 1, but unstable_roots gives {count}"
-        )
+def require_stable_loop(loop: Loop) -> None:
+    """Raise unless a loop is stable: the response of an unstable one looks like another."""
+    n, m, point = checked_loop(loop).open_functions((1.0, 1.0), {})
+    with decided("no response", point):
+        require_stable(n + m, common_zeros(n, m))
