@@ -600,8 +600,6 @@ def test_lists_and_arrays_have_the_results_of_each_and_the_reasons_of_those_with
     assert modulus_margin(SingleArm(), [0.5, 0.9]).value[1] == modulus_margin(SingleArm(), 0.9)
     radii: Any = varying_radius([SingleArm(), CommonArm()], 0.9, 0.8)
     assert radii.radius[1] == varying_radius(CommonArm(), 0.9, 0.8).radius
-    edges = critical_perturbation([CommonArm(g) for g in (0.1, 1.0)], (-1.0, -1.0))
-    assert edges.value[1] == critical_perturbation(CommonArm(1.0), (-1.0, -1.0))
     again = pickle.loads(pickle.dumps(found))
     assert np.array_equal(again.phase, found.phase, equal_nan=True)
     assert "results" in repr(found)

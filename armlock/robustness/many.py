@@ -74,42 +74,38 @@ class Many(Shown):
         return Table("Many loops or points", rows)
 
 
-def many(*, points: bool = True) -> Callable[[_Function], _Function]:
-    """Let a function take a list of systems and, with `points`, arrays of parameters."""
+def many(function: _Function) -> _Function:
+    """Let a function take a list of systems and arrays of parameters."""
+    name = next(iter(signature(function).parameters))
 
-    def decorate(function: _Function) -> _Function:
-        name = next(iter(signature(function).parameters))
+    @wraps(function)
+    def call(*values: Any, **numbers: Any) -> Any:
+        first, rest = values[0] if values else numbers.pop(name, None), values[1:]
+        loops = first if isinstance(first, list) else [first]
+        given: dict[Any, Any] = dict(enumerate(rest)) | numbers
+        names = dict(enumerate(System.of(loops[0], name).parameters if loops else ()))
+        arrays = {
+            place: real_array(names.get(place, str(place)), value)
+            for place, value in given.items()
+            if isinstance(value, list | tuple | np.ndarray)
+        }
+        if loops is not first and not any(one.ndim for one in arrays.values()):
+            return function(first, *rest, **numbers)
+        which = np.arange(len(loops)) if loops is first else np.array(0)
+        every = which, *arrays.values()
+        shape = broadcast_shape(("the list of loops", *map(str, arrays)), every)
 
-        @wraps(function)
-        def call(*values: Any, **numbers: Any) -> Any:
-            first, rest = values[0] if values else numbers.pop(name, None), values[1:]
-            loops = first if isinstance(first, list) else [first]
-            given: dict[Any, Any] = dict(enumerate(rest)) | numbers
-            names = dict(enumerate(System.of(loops[0], name).parameters if loops else ()))
-            arrays = {
-                place: real_array(names.get(place, str(place)), value)
-                for place, value in given.items()
-                if points and isinstance(value, list | tuple | np.ndarray)
-            }
-            if loops is not first and not any(one.ndim for one in arrays.values()):
-                return function(first, *rest, **numbers)
-            which = np.arange(len(loops)) if loops is first else np.array(0)
-            every = which, *arrays.values()
-            shape = broadcast_shape(("the list of loops", *map(str, arrays)), every)
+        def single(loop: int, *point: float) -> Any:
+            here = given | dict(zip(arrays, map(float, point), strict=True))
+            placed = [here.pop(i) for i in range(len(rest))]
+            try:
+                return function(loops[loop], *placed, **here)
+            except (ValueError, CountError) as error:
+                return error
+            finally:
+                progress.update()
 
-            def single(loop: int, *point: float) -> Any:
-                here = given | dict(zip(arrays, map(float, point), strict=True))
-                placed = [here.pop(i) for i in range(len(rest))]
-                try:
-                    return function(loops[loop], *placed, **here)
-                except (ValueError, CountError) as error:
-                    return error
-                finally:
-                    progress.update()
+        with Progress(math.prod(shape), function.__name__, " points") as progress:
+            return Many(np.frompyfunc(single, len(every), 1)(*every))
 
-            with Progress(math.prod(shape), function.__name__, " points") as progress:
-                return Many(np.frompyfunc(single, len(every), 1)(*every))
-
-        return cast("_Function", call)
-
-    return decorate
+    return cast("_Function", call)

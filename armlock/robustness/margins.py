@@ -151,7 +151,7 @@ class Margins(Shown):
         return Table("Margins", rows)
 
 
-@many()
+@many
 def modulus_margin(loop: Any, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> Any:
     r"""Smallest distance of the Nyquist curve from -1, min over omega of |1 + L|.
 
@@ -208,7 +208,7 @@ class PeakGain(NamedTuple):
     __repr__, _repr_html_ = as_text, as_html  # type: ignore[misc]
 
 
-@many()
+@many
 def peak_gain(system: Any, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> PeakGain:
     r"""Largest gain of a stable system over all frequencies, its H-infinity norm.
 
@@ -277,7 +277,7 @@ def peak_gain(system: Any, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> 
     return PeakGain(1.0 / found.value, found.omega)
 
 
-@many()
+@many
 def margins(
     loop: Any,
     *values: npt.ArrayLike,

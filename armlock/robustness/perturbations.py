@@ -29,7 +29,6 @@ from armlock.engine.inclusion import TERM, VERTEX
 from armlock.engine.polynomials import collected, exact, polynomial, rounded
 from armlock.engine.tolerances import BOUNDARY, EPSILON, UNCONFINED
 from armlock.loops import Loop, checked_loop
-from armlock.robustness.many import many
 from armlock.robustness.margins import first_zero
 from armlock.stability.counts import CountError, decided, unstable_roots
 from armlock.systems import NOW, Delay, Lag, Sum, System, delay_object
@@ -84,14 +83,6 @@ def _named(system: System, name: str, given: Any) -> dict[str, float]:
     return dict(zip(system.parameters, flat.tolist(), strict=True))
 
 
-def _along(terms: Sequence[Function], way: FloatArray) -> Function:
-    """Return the change of D, N or M along a direction."""
-    found = terms[0] * 0
-    for term, w in zip(terms[1:], way.tolist(), strict=True):
-        found = found + term * w
-    return found
-
-
 class _Ray:
     """N and M along a ray, affine in u, with t = u scale."""
 
@@ -108,18 +99,10 @@ class _Ray:
         self.scale = max(1.0, float(np.hypot.reduce(self.start))) / float(
             np.hypot.reduce(self.way)
         )
-        try:
-            affine = system.affine
-            self.n, self.m = affine.quotient(*self.start.tolist())
-            moved = [_along(part, self.way) * self.scale for part in (affine.n, affine.m)]
-            if not any(f.size_at_infinity for f in (self.n, self.m, *moved)):
-                raise NotAffineError("a parameter that stays is zero at the highest power")
-        except NotAffineError:
-            line = {k: System.of(begin[k]) + way[k] * _U for k in way}
-            along = self._along(system.at(**{**begin, **line}), way)
-            self.n, self.m = along.n[0], along.m[0]
-            moved = [part[1] * self.scale for part in (along.n, along.m)]
-        self.dn, self.dm = moved
+        line = {k: System.of(begin[k]) + way[k] * _U for k in way}
+        along = self._along(system.at(**{**begin, **line}), way)
+        (self.n, dn), (self.m, dm) = along.n, along.m
+        self.dn, self.dm = dn * self.scale, dm * self.scale
         self.f, self.g = self.n + self.m, self.dn + self.dm
 
     @staticmethod
@@ -250,21 +233,20 @@ def first_crossing(
     return Crossing(u * ray.scale, omega)
 
 
-@many(points=False)
-def critical_perturbation(loop: Any, direction: Point) -> Any:
+def critical_perturbation(loop: System, direction: Point) -> float:
     r"""Return the smallest perturbation in a direction that breaks the loop.
 
     Parameters
     ----------
     loop : System
-        The open loop, for instance `CommonArm()`, an equation, or a list of them.
+        The open loop, for instance `CommonArm()`, or an equation.
     direction : sequence of float, or dict by name
         How the parameters change from their nominal values, which are (1, 1) for a `Loop`:
         taken as given and not normalised.
 
     Returns
     -------
-    float, or `Many` with the attribute `value` of a list
+    float
         Smallest eps > 0 such that the count of the loop's unstable roots at the nominal
         values + eps direction is not zero: a root reaches the imaginary axis there, or the
         neutral root chain does. 0 if the loop is not stable next to the nominal values, inf if
@@ -284,7 +266,7 @@ def critical_perturbation(loop: Any, direction: Point) -> Any:
 
     See Also
     --------
-    armlock.robustness.first_crossing : from other points, and with the frequency.
+    armlock.first_crossing : from other points, and with the frequency.
 
     Notes
     -----
@@ -332,16 +314,16 @@ def critical_perturbation(loop: Any, direction: Point) -> Any:
     return eps
 
 
-def box_count(loop: System, size: float | Mapping[str, float]) -> int:
+def box_count(loop: System, size: float) -> int:
     r"""Count the unstable roots that all points of a box of parameters share.
 
     Parameters
     ----------
     loop : System
         The open loop, for instance `CommonArm()`, or an equation.
-    size : float, or dict by name
-        The box is that of all parameters that differ from their nominal value by at most this;
-        all of them, (1, 1) for a `Loop`, or those that are named.
+    size : float
+        The box is that of all parameters that differ from their nominal value, which is (1, 1)
+        for a `Loop`, by at most this. ``loop.at(c2=1.0)`` holds one of them.
 
     Returns
     -------
@@ -353,8 +335,8 @@ def box_count(loop: System, size: float | Mapping[str, float]) -> int:
     Raises
     ------
     TypeError, ValueError
-        If a size is not positive, a parameter has no nominal value, or the loop is not affine
-        in those of the box together.
+        If the size is not positive, a parameter has no nominal value, or the loop is not affine
+        in all of them together.
     CountError
         If it takes too many steps.
 
@@ -374,18 +356,14 @@ def box_count(loop: System, size: float | Mapping[str, float]) -> int:
     -1
     """
     system = System.of(loop, "loop")
-    if not isinstance(size, Mapping):
-        size = dict.fromkeys(system.parameters, positive_number("size", size))
-    half = {name: positive_number(name, value) for name, value in size.items()}
-    at = {name: real_number(name, value) for name, value in system.given((), {}).items()}
-    affine = system.affine if set(half) == set(at) else system.affine_in(tuple(half))
-    half = {name: half[name] for name in affine.free}
-    n, m = affine.quotient(*(at[name] for name in half))
-    centre, terms = n + m, affine.terms[1:]
-    corners = itertools.product(*((-v, v) for v in half.values()))
-    zero = (0.0,) * (1 + len(half))
+    half = positive_number("size", size)
+    point = [real_number(k, v) for k, v in system.given((), {}).items()]
+    n, m = system.affine.quotient(*point)
+    centre, terms = n + m, system.affine.terms[1:]
+    corners = itertools.product((-half, half), repeat=len(terms))
+    zero = (0.0,) * (1 + len(terms))
     family = Family([centre, *terms], [[(VERTEX, (1.0, *corner), zero) for corner in corners]])
-    with decided("not decided", np.array(list(at.values()))):
+    with decided("not decided", np.array(point)):
         if not np.isfinite(family.ends(0.0)):
             return UNCONFINED
         if not decide.excludes(family):

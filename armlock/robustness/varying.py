@@ -91,7 +91,7 @@ _PLACE = (
 )
 
 
-@many()
+@many
 def varying_radius(
     loop: Any, *values: npt.ArrayLike, **numbers: npt.ArrayLike
 ) -> VaryingRadius:
