@@ -39,72 +39,86 @@ This package is the companion to "Robustness Analysis and Controller Design of A
 System in Space-based Gravitational Wave Detectors".
 """
 
-from typing import Any
+import importlib
+from types import ModuleType as _Module
 
 from armlock import controllers as controllers
 from armlock import paper as paper
 from armlock import sensors as sensors
-from armlock.loops import (
-    CommonArm,
-    DualArm,
-    HayesEquation,
-    Loop,
-    SingleArm,
-    buildable_loop,
-    flight_loop,
-    paper_loop,
-    robust_loop,
-)
-from armlock.matrices import determinant, return_difference, state_space
-from armlock.performance.budget import NoiseBudget, noise_budget
-from armlock.performance.pulling import pulling
-from armlock.performance.transfer import transfer
-from armlock.robustness import (
-    Many,
-    Margins,
-    box_count,
-    critical_perturbation,
-    first_crossing,
-    margins,
-    modulus_margin,
-    peak_gain,
-    stable_half_differences,
-    varying_radius,
-)
-from armlock.stability.charts import StabilityChart, stability_chart
-from armlock.stability.counts import (
-    BOUNDARY,
-    UNCONFINED,
-    UNDECIDED,
-    CountError,
-    unstable_roots,
-)
-from armlock.stability.dcurve import d_curve, d_curve_branches, d_curve_line
-from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
-from armlock.stability.roots import (
-    CharacteristicRoots,
-    RootError,
-    characteristic_roots,
-    rightmost_root,
-)
-from armlock.stability.semidiscretization import (
-    semi_discretization,
-    spectral_radius,
-    transition_matrix,
-)
-from armlock.stability.windows import stable_delays
-from armlock.systems import Controller, System, delay, equation, parameter, s
-from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
-from armlock.timedomain.responses import impulse_response, step_info, step_response
-from armlock.timedomain.simulation import (
-    DivergenceError,
-    Simulation,
-    sampled_open_loop,
-    simulate,
-)
-from armlock.timedomain.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
+from armlock.loops import CommonArm as CommonArm
+from armlock.loops import DualArm as DualArm
+from armlock.loops import HayesEquation as HayesEquation
+from armlock.loops import Loop as Loop
+from armlock.loops import SingleArm as SingleArm
+from armlock.loops import buildable_loop as buildable_loop
+from armlock.loops import flight_loop as flight_loop
+from armlock.loops import paper_loop as paper_loop
+from armlock.loops import robust_loop as robust_loop
+from armlock.matrices import determinant as determinant
+from armlock.matrices import return_difference as return_difference
+from armlock.matrices import state_space as state_space
+from armlock.performance.budget import NoiseBudget as NoiseBudget
+from armlock.performance.budget import noise_budget as noise_budget
+from armlock.performance.pulling import pulling as pulling
+from armlock.performance.transfer import transfer as transfer
+from armlock.robustness.many import Many as Many
+from armlock.robustness.margins import Margins as Margins
+from armlock.robustness.margins import margins as margins
+from armlock.robustness.margins import modulus_margin as modulus_margin
+from armlock.robustness.margins import peak_gain as peak_gain
+from armlock.robustness.perturbations import box_count as box_count
+from armlock.robustness.perturbations import critical_perturbation as critical_perturbation
+from armlock.robustness.perturbations import first_crossing as first_crossing
+from armlock.robustness.perturbations import stable_half_differences as stable_half_differences
+from armlock.robustness.varying import varying_radius as varying_radius
+from armlock.stability.charts import StabilityChart as StabilityChart
+from armlock.stability.charts import stability_chart as stability_chart
+from armlock.stability.counts import BOUNDARY as BOUNDARY
+from armlock.stability.counts import UNCONFINED as UNCONFINED
+from armlock.stability.counts import UNDECIDED as UNDECIDED
+from armlock.stability.counts import CountError as CountError
+from armlock.stability.counts import unstable_roots as unstable_roots
+from armlock.stability.dcurve import d_curve as d_curve
+from armlock.stability.dcurve import d_curve_branches as d_curve_branches
+from armlock.stability.dcurve import d_curve_line as d_curve_line
+from armlock.stability.nyquist import AxisCrossings as AxisCrossings
+from armlock.stability.nyquist import NyquistCurve as NyquistCurve
+from armlock.stability.nyquist import axis_crossings as axis_crossings
+from armlock.stability.nyquist import nyquist as nyquist
+from armlock.stability.roots import CharacteristicRoots as CharacteristicRoots
+from armlock.stability.roots import RootError as RootError
+from armlock.stability.roots import characteristic_roots as characteristic_roots
+from armlock.stability.roots import rightmost_root as rightmost_root
+from armlock.stability.semidiscretization import semi_discretization as semi_discretization
+from armlock.stability.semidiscretization import spectral_radius as spectral_radius
+from armlock.stability.semidiscretization import transition_matrix as transition_matrix
+from armlock.stability.windows import stable_delays as stable_delays
+from armlock.systems import Controller as Controller
+from armlock.systems import System as System
+from armlock.systems import delay as delay
+from armlock.systems import equation as equation
+from armlock.systems import parameter as parameter
+from armlock.systems import s as s
+from armlock.timedomain.noise import LaserNoise as LaserNoise
+from armlock.timedomain.noise import PerturbationNoise as PerturbationNoise
+from armlock.timedomain.noise import ShapedNoise as ShapedNoise
+from armlock.timedomain.responses import impulse_response as impulse_response
+from armlock.timedomain.responses import step_info as step_info
+from armlock.timedomain.responses import step_response as step_response
+from armlock.timedomain.simulation import DivergenceError as DivergenceError
+from armlock.timedomain.simulation import Simulation as Simulation
+from armlock.timedomain.simulation import sampled_open_loop as sampled_open_loop
+from armlock.timedomain.simulation import simulate as simulate
+from armlock.timedomain.spectra import Spectrum as Spectrum
+from armlock.timedomain.spectra import SpectrumEstimator as SpectrumEstimator
+from armlock.timedomain.spectra import amplitude_spectrum as amplitude_spectrum
 
 __version__ = "0.1.0"
+__all__ = [
+    name
+    for name, value in globals().items()
+    if not name.startswith("_") and not isinstance(value, _Module)
+]
 
 
 def __dir__() -> list[str]:
@@ -112,81 +126,8 @@ def __dir__() -> list[str]:
     return [*__all__, "__version__", "controllers", "orbits", "paper", "sensors"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> _Module:
     """Import the orbits when they are asked for: SciPy's splines take half a second."""
     if name == "orbits":
-        import importlib
-
         return importlib.import_module("armlock.orbits")
     raise AttributeError(f"module 'armlock' has no attribute {name!r}")
-
-
-__all__ = [
-    "BOUNDARY",
-    "UNCONFINED",
-    "UNDECIDED",
-    "AxisCrossings",
-    "CharacteristicRoots",
-    "CommonArm",
-    "Controller",
-    "CountError",
-    "DivergenceError",
-    "DualArm",
-    "HayesEquation",
-    "LaserNoise",
-    "Loop",
-    "Many",
-    "Margins",
-    "NoiseBudget",
-    "NyquistCurve",
-    "PerturbationNoise",
-    "RootError",
-    "ShapedNoise",
-    "Simulation",
-    "SingleArm",
-    "Spectrum",
-    "SpectrumEstimator",
-    "StabilityChart",
-    "System",
-    "amplitude_spectrum",
-    "axis_crossings",
-    "box_count",
-    "buildable_loop",
-    "characteristic_roots",
-    "critical_perturbation",
-    "d_curve",
-    "d_curve_branches",
-    "d_curve_line",
-    "delay",
-    "determinant",
-    "equation",
-    "first_crossing",
-    "flight_loop",
-    "impulse_response",
-    "margins",
-    "modulus_margin",
-    "noise_budget",
-    "nyquist",
-    "paper_loop",
-    "parameter",
-    "peak_gain",
-    "pulling",
-    "return_difference",
-    "rightmost_root",
-    "robust_loop",
-    "s",
-    "sampled_open_loop",
-    "semi_discretization",
-    "simulate",
-    "spectral_radius",
-    "stability_chart",
-    "stable_delays",
-    "stable_half_differences",
-    "state_space",
-    "step_info",
-    "step_response",
-    "transfer",
-    "transition_matrix",
-    "unstable_roots",
-    "varying_radius",
-]
