@@ -149,8 +149,8 @@ class Line:
         known = (2.0 * half * missed <= _MISSED * self.whole) | (missed <= rounding)
         return known, [begins, halves, inner, errors + _HALVES_MISS * missed[:, None]]
 
-    def check(self, share: float = 1.0) -> None:
-        """Raise if some places of each octave ask for more than a share of the most panels."""
+    def check(self) -> None:
+        """Raise if some places of each octave ask for more than the most panels."""
         left, count, parts = np.arange(self.begin.size), 0, 1
         while left.size:
             half = np.repeat(self.half[left] / parts, _PLACES)
@@ -160,7 +160,7 @@ class Line:
             most = 2 * known.reshape(-1, _PLACES).sum(axis=1) > _PLACES
             count += 2 * parts * int(most.sum())
             left, parts = left[~most], 2 * parts
-            if count + 2 * parts * left.size > share * _MOST:
+            if count + 2 * parts * left.size > _MOST:
                 raise TooLongError(f"more than {_MOST} panels")
 
     def panels(self) -> Panels:

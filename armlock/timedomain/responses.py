@@ -42,10 +42,8 @@ _AWAY = 3.0
 _MOST_ABOVE = 1e3
 # Values above exp of this are no floats.
 _MOST_GROWTH = 600.0
-# The errors, over the largest value, which is looked for at twice so many times.
-_CLAIMED, _BETWEEN = 1e-9, 100
-# Share of the panels that are computed, up to which they are promised from a few.
-_SURELY = 0.7
+# The errors, over the largest value.
+_CLAIMED = 1e-9
 # Jumps and kinks that are followed.
 _MOST_JUMPS = 20_000
 
@@ -239,26 +237,38 @@ def _inverted(n: Sum, m: Sum, time: FloatArray) -> FloatArray:
     outputs, late = np.zeros(time.size), np.maximum(time[begin:] - float(dead), 0.0)
     if not late.size:
         return outputs
-    response, last = _Response(n, m, dead), float(late[-1]) or float(dead)
+    last = float(late[-1]) or float(dead)
     try:
-        found = response.until(last)
-        outputs[begin:], claimed = found.at(late)
-        why = "rounding errors above 1e-9 of the largest value"
+        found = _up_to(n, m, dead, last)
+        outputs[begin:] = found.at(late)
     except TooLongError as error:
-        claimed, why = False, str(error)
-    if not claimed:
-        until = response.longest(last) + float(dead)
+        until = _longest(n, m, dead, last) + float(dead)
         raise ValueError(
             f"timepts must end by {until:.2g} s, until when this response can be computed, got "
-            f"{last + float(dead):g} s, with {why}"
-        )
+            f"{last + float(dead):g} s, with {error}"
+        ) from None
     if impulses := found.jumps[0]:
         at = ", ".join(f"{float(theta + dead):g}" for theta in sorted(impulses)[:5])
         warnings.warn(f"impulses at t = {at} s are not in the outputs", stacklevel=5)
     return outputs
 
 
-class _Until(NamedTuple):
+def _longest(n: Sum, m: Sum, dead: fmpq, last: float) -> float:
+    """Return a time until which a response can be computed; at twice this time it cannot."""
+    short, long = 1e-12 * last, last
+    while long > 1.2 * short:
+        middle = math.sqrt(short * long)
+        try:
+            _up_to(n, m, dead, middle).check()
+        except TooLongError:
+            long = middle
+        else:
+            short = middle
+    # The check is an estimate.
+    return 0.7 * short
+
+
+class _UpTo(NamedTuple):
     """A response up to a time, by what is known of its transform."""
 
     last: float
@@ -268,124 +278,77 @@ class _Until(NamedTuple):
     # The rest on a line right of all poles.
     line: Line
 
-    def works(self) -> bool:
-        """Whether it can be computed, and its errors are as small as claimed."""
-        self.line.check(_SURELY)
-        growth = np.exp(self.line.sigma * self.last)
-        if growth * self.line.error <= 0.1 * _CLAIMED * self.line.least:
-            return True
-        return self.at(np.array([self.last]))[1]
+    def check(self) -> None:
+        """Raise if it takes too many panels, or the rounding errors of some are too large."""
+        self.line.check()
+        error = self.line.error * math.exp(self.line.sigma * self.last) / np.pi
+        self._require(error, self.line.least)
 
-    def at(self, time: FloatArray) -> tuple[FloatArray, bool]:
-        """Return the response at some times, and whether its errors are as small as claimed."""
-        rest = self.line.panels()
-
-        def found(at: FloatArray) -> tuple[FloatArray, FloatArray]:
-            value, error = inverted(rest, self.line.sigma, at)
-            for k, part in enumerate(self.jumps[1:]):
-                known, size = _after(at, part, k, self.corner, self.last)
-                value, error = value + known, error + 8.0 * EPSILON * size
-            return value, error
-
-        outputs, errors = found(time)
+    def _require(self, error: float, largest: float) -> None:
+        """Raise if an error is not small beside the largest value."""
         # An impulse counts by its area over the last time.
         area = sum(map(abs, self.jumps[0].values()))
-        largest, error = max(np.abs(outputs).max(), area / self.last), errors.max()
-        if not error <= _CLAIMED * largest:
-            # The largest value may lie between the times that are asked for.
-            between = np.append(
-                np.linspace(0.0, 1.0, _BETWEEN), np.geomspace(1e-12, 1.0, _BETWEEN)
-            )
-            largest = max(largest, np.abs(found(self.last * np.unique(between))[0]).max())
-        return outputs, bool(error <= _CLAIMED * largest)
+        if not error <= _CLAIMED * max(largest, area / self.last):
+            raise TooLongError("rounding errors above 1e-9 of the largest value")
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Return the response at some times, or raise if its errors may be too large."""
+        outputs, error = inverted(self.line.panels(), self.line.sigma, time)
+        for k, part in enumerate(self.jumps[1:]):
+            known, size = _after(time, part, k, self.corner, self.last)
+            outputs, error = outputs + known, error + 8.0 * EPSILON * size
+        self._require(error.max(), max(self.line.least, np.abs(outputs).max()))
+        return outputs
 
 
-class _Response:
-    """N / M without common factors, and what is known of its truncations."""
-
-    def __init__(self, n: Sum, m: Sum, dead: fmpq) -> None:
-        self.n, self.m, self.dead = n, m, dead
-        self.truncated: dict[tuple[int, int], _Truncated] = {}
-
-    def until(self, last: float) -> _Until:
-        """Transform the response to an impulse, as it is up to a time."""
-        # What comes later has no effect until then.
-        end = exact(last)
-        parts = (self.n, self.dead + end), (self.m, end)
-        n, m = (
+def _up_to(n: Sum, m: Sum, dead: fmpq, last: float) -> _UpTo:
+    """Transform the response to an impulse, as it is up to a time."""
+    # What comes later has no effect until then.
+    end = exact(last)
+    n, m = coprime(
+        *(
             Sum({key: p for key, p in part.terms.items() if key[0].time <= to})
-            for part, to in parts
+            for part, to in ((n, dead + end), (m, end))
         )
-        key = len(n.terms), len(m.terms)
-        if key not in self.truncated:
-            self.truncated[key] = _Truncated(*coprime(n, m), self.dead)
-        return self.truncated[key].until(last)
+    )
+    over, below = {theta - dead: p for theta, p in n.by_length().items()}, m.by_length()
+    degree = _degree(over, below)
+    system = System(_sum(over), _sum(below))
+    sigma = _right_of_poles(system, last) + _AWAY / last
+    # The largest of the roots of the denominator's polynomials.
+    roots = [root for p in below.values() for root, _ in enclosed_roots(p)]
+    fastest = max((abs(complex(root)) for root in roots), default=0.0)
+    #: One over the shortest delay.
+    delays = [float(theta) for part in (over, below) for theta in part if theta]
+    soonest = 1.0 / min(delays, default=np.inf)
+    corner = max(1.0 / last, fastest)
+    while True:
+        above, under = (_powers(part, degree, corner) for part in (over, below))
+        jumps = _expansion(above, under, last * (1.0 + 1e-9))
+        # Without impulses the response is as large as s times its transform at any real s.
+        s = np.geomspace(sigma, 100.0 * max(corner, soonest), 50).astype(complex)
+        impulses = _parts(above, under, corner, s)[0]
+        size = float(np.abs(s * (system(s) - impulses)).max())
+        # Parts that are far larger than the response would cancel against the rest.
+        heights = [abs(a) / corner ** (k - 1) for k in (2, 3) for a in jumps[k].values()]
+        if corner >= soonest or max(heights, default=0.0) <= _MOST_ABOVE * size:
+            rest = partial(_smooth, system, above, under, corner)
+            return _UpTo(last, jumps, corner, Line(rest, sigma, corner, size))
+        corner *= 8.0
 
-    def longest(self, last: float) -> float:
-        """Return a time until which a response can be computed; a little later it cannot."""
-        short, long = 1e-12 * last, last
-        while long > 1.2 * short:
-            middle = math.sqrt(short * long)
-            try:
-                works = self.until(middle).works()
-            except TooLongError:
-                works = False
-            short, long = (middle, long) if works else (short, middle)
-        # The message has two digits.
-        return 0.95 * short
 
-
-class _Truncated:
-    """N / M of the delays up to a time, and between which lines the rightmost pole lies."""
-
-    def __init__(self, n: Sum, m: Sum, dead: fmpq) -> None:
-        self.n = {theta - dead: p for theta, p in n.by_length().items()}
-        self.m = m.by_length()
-        self.degree = _degree(self.n, self.m)
-        self.system = System(_sum(self.n), _sum(self.m))
-        # The largest of the roots of the denominator's polynomials.
-        roots = [root for p in self.m.values() for root, _ in enclosed_roots(p)]
-        self.fastest = max((abs(complex(root)) for root in roots), default=0.0)
-        #: One over the shortest delay.
-        delays = [float(theta) for part in (self.n, self.m) for theta in part if theta]
-        self.soonest = 1.0 / min(delays, default=np.inf)
-        self.below = System(_sum(self.m), Sum({})).affine.n[0]
-        self.low, self.high = 0.0, np.inf
-
-    def until(self, last: float) -> _Until:
-        """Transform the response to an impulse, as it is up to a time."""
-        sigma = self.right_of_poles(last) + _AWAY / last
-        corner, end = max(1.0 / last, self.fastest), last * (1.0 + 1e-9)
-        while True:
-            above, under = (_powers(part, self.degree, corner) for part in (self.n, self.m))
-            jumps = _expansion(above, under, end)
-            # Without impulses the response is as large as s times its transform at any real s.
-            s = np.geomspace(sigma, 100.0 * max(corner, self.soonest), 50).astype(complex)
-            impulses = _parts(above, under, corner, s)[0]
-            size = float(np.abs(s * (self.system(s) - impulses)).max())
-            # Parts that are far larger than the response would cancel against the rest.
-            heights = [abs(a) / corner ** (k - 1) for k in (2, 3) for a in jumps[k].values()]
-            if corner >= self.soonest or max(heights, default=0.0) <= _MOST_ABOVE * size:
-                rest = partial(_smooth, self.system, above, under, corner)
-                return _Until(last, jumps, corner, Line(rest, sigma, corner, size))
-            corner *= 8.0
-
-    def right_of_poles(self, last: float) -> float:
-        """Real part right of all poles, and not farther than two over the last time."""
-        # Lines are multiples of a power of two, so that no other time that was asked for before
-        # makes another line.
-        unit, most = 0.5 ** math.floor(math.log2(last)), _MOST_GROWTH / last
-        while self.high - self.low > unit and self.low < most:
-            found = np.isfinite(self.high)
-            line = 0.5 * (self.low + self.high) if found else max(2.0 * self.low, unit)
-            if count(self.below, right_of=line) == 0:
-                self.high = line
-            else:
-                self.low = line
-        line = unit * math.ceil(min(self.high, 2.0 * most) / unit)
-        if line > most:
+def _right_of_poles(system: System, last: float) -> float:
+    """Real part right of all poles, and not farther than two over the last time."""
+    poles = System(system.denominator, Sum({})).affine.n[0]
+    step, low, high = 1.0 / last, 0.0, 1.0 / last
+    while count(poles, right_of=high) != 0:
+        low, high = high, 2.0 * high
+        if low > _MOST_GROWTH / last:
             raise TooLongError("values above 1e308")
-        return line
+    while high - low > step:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if count(poles, right_of=middle) == 0 else (middle, high)
+    return high
 
 
 def _sum(part: _Terms) -> Sum:
