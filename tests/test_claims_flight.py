@@ -48,7 +48,7 @@ def test_no_mean_length_of_the_arms_leaves_more_of_the_laser(chapter):
 
 
 def test_errors_of_doppler_estimates_are_those_of_a_fitted_line(chapter):
-    level = budget.LEVELS.free_running
+    level = float(budget.free_running(np.array(1.0)))
     noise = LaserNoise(seed=1, sample_rate=1.0, level=level).draw(2_000_000)
     measured = 2.0 * (noise[34:] - noise[:-34])
     parts = measured[: measured.size // 200 * 200].reshape(-1, 200).T

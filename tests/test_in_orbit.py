@@ -22,7 +22,7 @@ from armlock import (
     stable_half_differences,
     unstable_roots,
 )
-from armlock.orbits import SPEED_OF_LIGHT, from_table, kepler
+from armlock.orbits import SPEED_OF_LIGHT, Constellation, from_table, kepler
 from armlock.sensors import dual
 from tests import draws
 
@@ -266,7 +266,7 @@ def test_files_of_oem_are_read_as_the_page_shows(tmp_path, monkeypatch):
         Path(f"lisa{k + 1}.oem").write_text(whole, "utf-8")
     names: dict[str, Any] = {"np": np, "from_table": from_table}
     exec(OEM, names)
-    orbit = names["orbit"]
+    orbit: Constellation = names["orbit"]
     when = np.linspace(*orbit.span, 200)
     off = np.subtract(orbit.round_trips(when, 2), kepler().round_trips(when, 2))
     assert np.abs(off).max() < 5e-11

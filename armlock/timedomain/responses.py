@@ -279,17 +279,11 @@ class _UpTo(NamedTuple):
     line: Line
 
     def check(self) -> None:
-        """Raise if it takes too many panels, or the rounding errors of some are too large."""
+        """Raise if it takes too many panels, or if its errors would be too large."""
         self.line.check()
-        error = self.line.error * math.exp(self.line.sigma * self.last) / np.pi
-        self._require(error, self.line.least)
-
-    def _require(self, error: float, largest: float) -> None:
-        """Raise if an error is not small beside the largest value."""
-        # An impulse counts by its area over the last time.
-        area = sum(map(abs, self.jumps[0].values()))
-        if not error <= _CLAIMED * max(largest, area / self.last):
-            raise TooLongError("rounding errors above 1e-9 of the largest value")
+        error = self.line.error * np.exp(self.line.sigma * self.last) / np.pi
+        if not error <= 0.1 * _CLAIMED * self.line.least:
+            self.at(np.array([self.last]))
 
     def at(self, time: FloatArray) -> FloatArray:
         """Return the response at some times, or raise if its errors may be too large."""
@@ -297,7 +291,11 @@ class _UpTo(NamedTuple):
         for k, part in enumerate(self.jumps[1:]):
             known, size = _after(time, part, k, self.corner, self.last)
             outputs, error = outputs + known, error + 8.0 * EPSILON * size
-        self._require(error.max(), max(self.line.least, np.abs(outputs).max()))
+        # An impulse counts by its area over the last time.
+        area = sum(map(abs, self.jumps[0].values()))
+        largest = max(np.abs(outputs).max(), area / self.last, self.line.least)
+        if not error.max() <= _CLAIMED * largest:
+            raise TooLongError("rounding errors above 1e-9 of the largest value")
         return outputs
 
 
