@@ -317,17 +317,6 @@ def test_roots_behind_the_one_at_zero_are_not_passed_over(loop):
         critical_perturbation(loop, (-1.0, -1.0))
 
 
-def test_margins_of_an_unstable_loop_name_a_gain_that_makes_it_stable():
-    loop = 0.5 / (s - 1) * delay(0.1)
-    with pytest.raises(
-        ValueError, match=r"has 1 unstable root; with a gain factor of 3\.16 it"
-    ):
-        margins(loop)
-    assert unstable_roots(3.16 * loop) == 0
-    with pytest.raises(ValueError, match="none of 25 gain factors"):
-        margins(1 / ((s - 1) * (s - 1)))
-
-
 def test_a_count_that_contradicts_the_first_break_is_refused(monkeypatch):
     monkeypatch.setattr(perturbations, "first_zero", lambda *_: (1e-6, 1.0))
     with pytest.raises(CountError, match="contradict"):

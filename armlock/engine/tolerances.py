@@ -40,8 +40,6 @@ MANY_UNDECIDED = 4096
 #: Rounding hides D(0) at a point of a chart that is at most this share of its terms: the point
 #: is counted with exact weights.
 HIDDEN_AT_ZERO = 8.0 * EPSILON
-#: Rounding hides a pole of a D-curve where it is nearer than this share of the frequency.
-HIDDEN_POLE = 4.0 * EPSILON
 
 # -------------------------------------------------------------- -2: the chain at high frequency
 

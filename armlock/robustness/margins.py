@@ -40,9 +40,6 @@ from armlock.tables import Shown, Table, as_html, as_text, at, decibels, number
 
 _T = TypeVar("_T")
 
-# Gain factors that are tried for an unstable loop, those next to one first; most steps of each.
-_STEPS_OF_A_TRY = 2000
-_TRIED = sorted((10.0 ** (k / 4) for k in range(-12, 13)), key=lambda k: max(k, 1.0 / k))
 # Gain factors up to which is searched, the next one where doubles do not decide the last one;
 # and most steps of a proof that no gain is too large.
 _GAINS, _STEPS_OF_A_PROOF = (1e6, 1e4, 1e2), 200_000
@@ -311,8 +308,7 @@ def margins(
     ------
     TypeError, ValueError
         If `loop` is no open loop, or no `Loop` where phases are free, a parameter is not finite
-        and real, or `free_above` is not positive; or the loop is not stable there. The message
-        then names a gain factor with which it is, if one was found.
+        and real, or `free_above` is not positive; or the loop is not stable there.
     CountError
         If double precision, or the steps allowed, do not decide a margin.
 
@@ -353,7 +349,7 @@ def margins(
     array([0.606 , 0.4435,    nan])
     """
     if free_above is None:
-        return _certified(_with_a_gain, loop, values, numbers)
+        return _certified(margins_of, loop, values, numbers)
     loop = checked_loop(loop, "free_above frees the phases of its arms, which it alone names")
     above = positive_number("free_above", free_above)
     given = {name: real_number(name, x) for name, x in loop.given(values, numbers).items()}
@@ -374,23 +370,6 @@ def _certified(
     n, m, point = System.of(loop, "loop").open_functions(values, numbers)
     with decided("no margin", point):
         return compute(n, m)
-
-
-def _with_a_gain(n: Function, m: Function) -> Margins:
-    """Return the margins, or name a gain factor that makes an unstable loop stable."""
-    try:
-        return margins_of(n, m)
-    except UnstableError as error:
-        shared, tried = common_zeros(n, m), 0
-        for gain in _TRIED:
-            with suppress(UndecidedError):
-                count = decide.count(m + n * gain, shared, most=_STEPS_OF_A_TRY)
-                tried += 1
-                if count == 0:
-                    found = f"with a gain factor of {gain:.3g} it is stable"
-                    raise ValueError(f"{error}; {found}") from None
-        found = f"none of {tried} gain factors from 0.001 to 1000 makes it stable"
-        raise ValueError(f"{error}; {found}") from None
 
 
 class Free(NamedTuple):
