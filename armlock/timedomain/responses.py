@@ -303,20 +303,15 @@ def _up_to(n: Sum, m: Sum, dead: fmpq, last: float) -> _UpTo:
     """Transform the response to an impulse, as it is up to a time."""
     # What comes later has no effect until then.
     end = exact(last)
-    n, m = coprime(
-        *(
-            Sum({key: p for key, p in part.terms.items() if key[0].time <= to})
-            for part, to in ((n, dead + end), (m, end))
-        )
-    )
-    over, below = {theta - dead: p for theta, p in n.by_length().items()}, m.by_length()
+    over = {theta - dead: p for theta, p in n.by_length().items() if theta <= dead + end}
+    below = {theta: p for theta, p in m.by_length().items() if theta <= end}
     degree = _degree(over, below)
     system = System(_sum(over), _sum(below))
     sigma = _right_of_poles(system, last) + _AWAY / last
     # The largest of the roots of the denominator's polynomials.
     roots = [root for p in below.values() for root, _ in enclosed_roots(p)]
     fastest = max((abs(complex(root)) for root in roots), default=0.0)
-    #: One over the shortest delay.
+    # One over the shortest delay.
     delays = [float(theta) for part in (over, below) for theta in part if theta]
     soonest = 1.0 / min(delays, default=np.inf)
     corner = max(1.0 / last, fastest)
