@@ -261,10 +261,6 @@ def at_points(
     return system, np.column_stack(columns or [np.empty((1, 0))]), shape
 
 
-class UnstableError(ValueError):
-    """A loop has to be stable, and is not."""
-
-
 def require_stable(
     d: Function, common: int = 0, what: str = "loop", zero: str = "root"
 ) -> None:
@@ -277,4 +273,4 @@ def require_stable(
             1: f"1 unstable {zero}",
         }
         found = reasons.get(count, f"{count} unstable {zero}s")
-        raise UnstableError(f"{what} must be stable, but it has {found}")
+        raise ValueError(f"{what} must be stable, but it has {found}")

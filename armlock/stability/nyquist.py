@@ -386,7 +386,8 @@ def axis_crossings(
         np.array([omega_max]), begin=begin,
     )  # fmt: skip
     if found.unfinished.any():
-        raise CountError(f"no crossings{place(point)}: they take too many steps", point[None])
+        why = f"they take too many steps up to {omega_max:.3g} rad/s, give a lower omega_max"
+        raise CountError(f"no crossings{place(point)}: {why}", point[None])
     told = found.jump != 0
     hidden = ~told & (found.x - found.spread < -_SMALL) & (found.x + found.spread > -_LARGE)
     value = _response(n, m, found.omega).real

@@ -153,8 +153,6 @@ class Spectrum(Shown):
         TypeError, ValueError
             If `asd` does not return finite real numbers.
         """
-        if not callable(asd):
-            raise TypeError(f"asd must be a function of the frequency, got {asd!r}")
         spread, weights = _response()
         result = np.empty(self.frequency.size)
         for i, centre in enumerate(self.frequency):
