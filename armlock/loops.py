@@ -88,7 +88,7 @@ class Loop(System):
         Controller times actuator, K(s), see `armlock.System.of`.
     mapping : SignalMapping or str
         The sensor: an object, for instance `armlock.sensors.COMMON`, or a name ("single",
-        "common", "difference", "dual", "modified dual"), see `armlock.sensors.named`.
+        "common", "difference", "dual", "modified dual"), see `armlock.sensors.NAMED`.
     tau1, tau2 : float
         Round-trip delays of the two arms, in s. A mapping without arm 2, such as "single",
         needs no tau2.
@@ -287,7 +287,7 @@ def _mapping_and_delays(
         )
     tau1 = positive_number("tau1", tau1)
     if isinstance(mapping, str):
-        one_of("mapping", mapping, sensors.NAMES)
+        one_of("mapping", mapping, sensors.NAMED)
     if mapping == "single" or (
         isinstance(mapping, SignalMapping) and not any(mapping.numerator2)
     ):
@@ -296,7 +296,7 @@ def _mapping_and_delays(
         raise TypeError(f"tau2 must be given: the signal mapping {mapping!r} has two arms")
     tau2 = positive_number("tau2", tau2)
     if isinstance(mapping, str):
-        return sensors.named(mapping, tau1, tau2), tau1, tau2
+        return sensors.NAMED[mapping](tau1, tau2), tau1, tau2
     if not any(mapping.numerator1) and not any(mapping.numerator2):
         raise ValueError("mapping must not be zero: there would be no loop")
     return mapping, tau1, tau2

@@ -21,7 +21,6 @@ from armlock import paper
 from armlock.checks import (
     ComplexArray,
     axis,
-    one_of,
     positive_number,
     real_number,
 )
@@ -220,42 +219,13 @@ def _modified_dual(mean: float, half: float, w0: float) -> SignalMapping:
     )
 
 
-# The signal mappings of the paper by name, made of the delays of the two arms.
-_NAMED: dict[str, Callable[[float, float], SignalMapping]] = {
+#: The signal mappings that `Loop` takes by name, made of the delays tau1 and tau2 in s. The
+#: corner of the dual ones is `armlock.paper.DUAL_SENSOR_CORNER`, an assumption, and the
+#: difference of "dual" is tau1 - tau2.
+NAMED: dict[str, Callable[[float, float], SignalMapping]] = {
     "single": lambda tau1, tau2: SINGLE,
     "common": lambda tau1, tau2: COMMON,
     "difference": lambda tau1, tau2: DIFFERENCE,
     "dual": lambda tau1, tau2: dual(paper.DUAL_SENSOR_CORNER, tau1 - tau2),
     "modified dual": lambda tau1, tau2: modified_dual(0.5 * (tau1 + tau2), 0.5 * (tau1 - tau2)),
 }
-#: Names of the signal mappings that `Loop` takes in place of an object.
-NAMES = tuple(_NAMED)
-
-
-def named(name: str, tau1: float, tau2: float) -> SignalMapping:
-    """Return a signal mapping of the paper by its name, made for these delays.
-
-    Parameters
-    ----------
-    name : {"single", "common", "difference", "dual", "modified dual"}
-        The corner of the dual ones is `armlock.paper.DUAL_SENSOR_CORNER`, an assumption. The
-        dtau of "dual" is tau1 - tau2.
-    tau1, tau2 : float
-        Round-trip delays in s.
-
-    Returns
-    -------
-    SignalMapping
-
-    Raises
-    ------
-    TypeError, ValueError
-        If there is none of this name, or a dual one is asked for equal delays.
-
-    Examples
-    --------
-    >>> from armlock.sensors import COMMON, named
-    >>> named("common", 20.1, 19.9) is COMMON
-    True
-    """
-    return _NAMED[one_of("mapping", name, NAMES)](tau1, tau2)
