@@ -266,7 +266,7 @@ def peak_gain(system: Any, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> 
         )
     with decided("no peak gain", point):
         require_stable(d, common_zeros(n, d), "system", "pole")
-        found = decided_ratio(d, n)
+        found = least_ratio(d, n)
     return PeakGain(1.0 / found.value, found.omega)
 
 
@@ -547,6 +547,11 @@ def least_ratio(
     Ratio
         At inf for the limit at high frequency, at 0 for the limit at s = 0. Infinite where N
         is zero.
+
+    Raises
+    ------
+    UndecidedError
+        If rounding at high frequency leaves room for one that is smaller by a thousandth.
     """
     if n.is_zero:
         return Ratio(math.inf, math.inf, math.nan)
@@ -557,29 +562,16 @@ def least_ratio(
         best, where = zero, 0.0
     best, where = _over_axis(_shares, d, n, free, DISTANCE, best, where, min(tolerance, 1.0))
     tolerance = max(tolerance, _FREE_TOLERANCE) if free else tolerance
-    return Ratio(best, best * max(1.0 - tolerance, 0.0) * (1.0 - 4.0 * EPSILON), where)
-
-
-def decided_ratio(
-    d: Function, n: Function, free: Free | None = None, **options: float
-) -> Ratio:
-    """Return the infimum of |D / N|, as `least_ratio`, if it is certified to a thousandth.
-
-    Raises
-    ------
-    UndecidedError
-        If rounding at high frequency leaves room for a smaller one.
-    """
-    found = least_ratio(d, n, free, **options)
-    if found.certified < (1.0 - _LEAST_CERTAIN) * found.value:
+    certified = best * max(1.0 - tolerance, 0.0) * (1.0 - 4.0 * EPSILON)
+    if certified < (1.0 - _LEAST_CERTAIN) * best:
         raise UndecidedError("rounding does not decide the limit at high frequency")
-    return found
+    return Ratio(best, certified, where)
 
 
 def modulus_of(n: Function, m: Function, free: Free | None = None) -> tuple[float, float]:
     """Smallest |1 + L|, one over the peak gain of the sensitivity M / (M + N), and where."""
     closed = free._replace(centre=free.centre + free.denominator) if free else None
-    found = decided_ratio(n + m, m, closed)
+    found = least_ratio(n + m, m, closed)
     return found.value, found.omega
 
 

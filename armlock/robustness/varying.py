@@ -33,7 +33,7 @@ from armlock.engine.polynomials import (
 from armlock.engine.tolerances import UndecidedError
 from armlock.loops import checked_loop
 from armlock.robustness.many import many
-from armlock.robustness.margins import decided_ratio, first_zero
+from armlock.robustness.margins import first_zero, least_ratio
 from armlock.stability.counts import decided, require_stable
 from armlock.tables import Table, as_html, as_text, number
 from armlock.tables import at as where
@@ -302,7 +302,7 @@ def varying_radius_of(
     for _ in range(_MOST_SCALINGS):
         sizes = [exact(size) ** 2 for size in scalings.tolist()]
         f = spectral_factor(parts, [sum(sizes) / size for size in sizes])
-        _, radius, omega = decided_ratio(*_beside(d, f), tolerance=_TOLERANCE)
+        _, radius, omega = least_ratio(*_beside(d, f), tolerance=_TOLERANCE)
         if radius > best[0]:
             spread = np.ones(len(changes))
             spread[acting] = scalings
