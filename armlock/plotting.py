@@ -18,7 +18,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 from matplotlib.projections.polar import PolarAxes
-from scipy import ndimage
 
 from armlock.checks import ComplexArray, FloatArray
 
@@ -118,6 +117,8 @@ def _edges(name: str, axis: FloatArray) -> FloatArray:
 
 def _label_regions(ax: Axes, chart: Any) -> None:
     """Write the count into each region, at its point that is farthest from the edges."""
+    from scipy import ndimage  # half a second, which most figures need not wait for
+
     room = _ROOM * min(chart.counts.shape)
     for count in np.unique(chart.counts[chart.counts >= 0]):
         depth = ndimage.distance_transform_edt(np.pad(chart.counts == count, 1))

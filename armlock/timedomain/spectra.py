@@ -51,6 +51,11 @@ _TOGETHER = 64
 _BLOCK = 1 << 20
 
 _WINDOW = np.kaiser(SEGMENT + 1, 20.0)[:-1]
+# A windowed sinc with the cut-off at the next rate; Kaiser's rule gives the window.
+_FILTER = np.kaiser(_TAPS, 0.1102 * (120.0 - 8.7)) * np.sinc(
+    np.arange(-(_TAPS // 2), _TAPS // 2 + 1) / FACTOR
+)
+_FILTER /= _FILTER.sum()
 # Points per bin at which `Spectrum.expected` samples a density.
 _FINE = 8
 
@@ -216,14 +221,6 @@ def _averages(segments: int, bins: int) -> float:
     return float(segments * bins / correlated)
 
 
-@cache
-def _filter() -> FloatArray:
-    # Importing scipy.signal takes as long as importing this package.
-    from scipy.signal import firwin, kaiser_beta
-
-    return np.asarray(firwin(_TAPS, 1.0 / FACTOR, window=("kaiser", kaiser_beta(120.0))))
-
-
 class _Rate:
     """One rate of the ladder."""
 
@@ -259,7 +256,7 @@ class _Rate:
         if count == 0:
             return np.empty(0)
         # Only the samples that are kept are computed; the filter is symmetric.
-        return np.asarray(np.vecdot(sliding_window_view(series, _TAPS)[::FACTOR], _filter()))
+        return np.asarray(np.vecdot(sliding_window_view(series, _TAPS)[::FACTOR], _FILTER))
 
     def bands(self, numbers: IntArray) -> list[tuple[float, ...]]:
         """Average bins in bands; rows (frequency, power, averages, width, number of bins)."""
