@@ -28,8 +28,8 @@ sources = $(shell find $(1) -type f -not -name '*.py[co]' -not -name '*.nb[ic]' 
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book pdf print browser same lab test tests attack claims pins bench dist \
-	lint format lock clean
+.PHONY: help env book pdf print browser same lab test tests attack pins bench dist lint \
+	format lock clean
 
 help: ## List the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-15s%s\n", $$1, $$2}'
@@ -88,7 +88,7 @@ book: ## Run all notebooks and build the book, as HTML that needs no network
 	@echo "The book is ready. Open it in a browser: file://$(CURDIR)/$(BOOK)"
 
 prepare = rm -rf $(1); mkdir -p $(1)/$(2); cp -R build/figures $(1)/$(2); \
-	cp -R build/cache $(1)/.jupyter_cache; $(PY) -m book.companion.ledger show $(1)/$(2)/figures > build/claims.txt
+	cp -R build/cache $(1)/.jupyter_cache; $(PY) -m book.companion.ledger write $(1)/$(2)/figures
 jupyter-book = $(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml
 
 # The new book replaces the old one when it is complete.
@@ -118,18 +118,15 @@ browser: ## Check every page and all windows in Chromium; run the code as it sho
 lab: $(READY) ## Open the notebooks in JupyterLab
 	$(VENV)/bin/jupyter-lab --notebook-dir notebooks $(if $(filter 0,$(shell id -u)),--allow-root)
 
-test: ## Run all tests, notebooks included
+test: ## Build the book and run all tests
 	+@$(alone) tests
 
-tests: $(EXECUTED)
+tests: $(BOOK)
 	$(PYTEST) tests
 
-attack: $(EXECUTED) ## Run all tests in full: more random cases, all windows; and brute force
+attack: $(BOOK) ## Run all tests in full: more random cases, all windows; and brute force
 	FULL=1 $(PYTEST) tests
 	$(PY) -m tests.attack --loops 200
-
-claims: $(READY) ## Print the ledger of claims, and write it as CSV and JSON
-	@$(PY) -m book.companion.ledger show build/claims
 
 # Of some chapters: make pins NOTEBOOKS=notebooks/08_controller.ipynb
 pins: $(READY) ## Run the notebooks, write what they find into the ledger's file, show what changed

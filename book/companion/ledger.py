@@ -366,8 +366,8 @@ class Ledger:
             ] += 1
         return kinds
 
-    def write(self, folder: Path) -> list[Path]:
-        """Write claims.csv and claims.json into a folder, and return their paths."""
+    def write(self, folder: Path) -> None:
+        """Write claims.csv and claims.json into a folder."""
         records = [
             {
                 "claim": " ".join(claim.names),
@@ -389,13 +389,12 @@ class Ledger:
             for claim in self
         ]
         folder.mkdir(parents=True, exist_ok=True)
-        table, tree = folder / "claims.csv", folder / "claims.json"
-        with table.open("w", newline="", encoding="utf-8") as stream:
+        with (folder / "claims.csv").open("w", newline="", encoding="utf-8") as stream:
             writer = csv.DictWriter(stream, fieldnames=list(records[0]))
             writer.writeheader()
             writer.writerows(records)
-        tree.write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n", "utf-8")
-        return [table, tree]
+        text = json.dumps(records, indent=1, ensure_ascii=False)
+        (folder / "claims.json").write_text(text + "\n", "utf-8")
 
 
 _KINDS = {"weight": Weight, "verdict": Verdict, "affects": tuple}
@@ -563,19 +562,9 @@ def update(folder: Path, file: Path = FILE) -> list[str]:
     ]
 
 
-def main(command: str, folder: Path) -> None:
-    """Show the ledger and write it as data, or update the file."""
-    if command == "update":
-        print(*update(folder) or ["nothing has changed"], sep="\n")
-        return
-    ledger = Ledger()
-    for claim in ledger:
-        print(f"{claim.name:4s} {claim.verdict.upper()}   ({claim.weight}; {claim.places})")
-        print(f"     {claim.says}\n     {claim.text('quantity')}: {claim.number}")
-        print(f"     {claim.text('note')}\n")
-    for path in ledger.write(folder):
-        print(f"written: {path}")
-
-
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]))
+    command, given = sys.argv[1], Path(sys.argv[2])
+    if command == "update":
+        print(*update(given) or ["nothing has changed"], sep="\n")
+    else:
+        Ledger().write(given)
