@@ -123,14 +123,13 @@ def test_modulus_and_peak_gain_of_the_loops(make):
 
 
 def test_what_is_refused_says_why():
-    hint = r"; of an open loop L take 1 / \(1 \+ L\) or L\.feedback\(\)"
     unstable = 1 / (1 + CommonArm().at(c1=1.1, c2=1.0))
-    with pytest.raises(ValueError, match="^system must be stable, .* 5 unstable poles" + hint):
+    with pytest.raises(ValueError, match=r"^system must be stable, .* 5 unstable poles"):
         peak_gain(unstable)
     for axis in (1 / s, 1 / (s**2 + 4), 3 * delay(0.1) / (s * (s + 1))):
-        with pytest.raises(ValueError, match="it has a pole on the imaginary axis" + hint):
+        with pytest.raises(ValueError, match="it has a pole on the imaginary axis"):
             peak_gain(axis)
-    with pytest.raises(ValueError, match="it has 1 unstable pole" + hint):
+    with pytest.raises(ValueError, match="it has 1 unstable pole"):
         peak_gain(1 / (s - 1))
     with pytest.raises(ValueError, match="loop must be stable, but it has 5 unstable roots"):
         varying_radius(CommonArm(), 1.1)
