@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass
+from math import factorial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import flint
@@ -21,7 +21,7 @@ from flint import acb, acb_poly, arb, fmpq_poly
 from armlock.checks import ComplexArray, FloatArray, real_number, whole_steps
 from armlock.engine import chain, decide, inclusion
 from armlock.engine.functions import Function, Space, common_zeros
-from armlock.engine.polynomials import enclosed_roots, order
+from armlock.engine.polynomials import enclosed_roots
 from armlock.engine.tolerances import BOUNDARY, UNCONFINED, UndecidedError
 from armlock.stability.counts import CountError, at_points, count_exactly, decided, place
 from armlock.systems import System
@@ -34,20 +34,16 @@ if TYPE_CHECKING:
 # How far right of the root that is returned no other one lies: the first share of abs(s), or of
 # one over the longest delay, if so fine a count is decided in so few steps. Otherwise it is the
 # second share of abs(Re s), or of one over the longest delay. Real parts that differ by less
-# than the first count as equal.
+# than half of the first count as equal.
 _FINEST, _FINE = 1e-11, 1e-6
 _FEW_STEPS, _MANY_STEPS = 200_000, 2_000_000
-# The search for one root ends once it has cost so many steps, some five seconds.
-_ALL_STEPS = 4e6
+# A search ends once it has cost so many steps, some five seconds, or so many lines of a list.
+_ALL_STEPS, _LINES = 4e6, 24
 # Most points of one line, and from how many of them Newton's method starts.
 _MOST_POINTS, _MOST_STARTS = 500_000, 1000
-# The line next to the limit of a neutral chain has been searched with so many points.
-_ENOUGH_POINTS = 200_000
 # A line is followed up to where roots can lie right of it, and so many turns of the longest
 # delay further, but at first no longer than 1000 times that; with each line twice as far.
 _TURNS_FURTHER, _MOST_TURNS_FURTHER = 4.0, 3e4
-# So often the way from the limit of a chain to a line right of it is doubled.
-_MOST_DOUBLED = 64
 # Steps of Newton's method in double precision, and most in balls.
 _STEPS, _BALL_STEPS = 12, 60
 # Most roots near a line that are tried when the rightmost one is looked for.
@@ -59,11 +55,11 @@ _LARGEST_EXPONENT = 600.0
 # Bits of balls, one after the other, and most roots in one disc, of at most this radius over
 # the size of the root.
 _BITS, _MOST_IN_A_DISC, _WIDEST = (192, 640, 2560), 12, 1e-3
-# Most roots that are listed, lines on which they are looked for, and the degree up to which
-# those of a map are roots of one polynomial.
-_MOST_ROOTS, _LINES, _LARGEST_MAP = 10_000, 24, 2000
-# Rounds of Newton's method for what is not yet known, and when two candidates are one.
-_ROUNDS, _SAME = 8, 1e-10
+# Most roots that are listed, and the degree up to which those of a map are roots of one
+# polynomial.
+_MOST_ROOTS, _LARGEST_MAP = 10_000, 2000
+# Two candidates that differ by this share are one.
+_SAME = 1e-10
 
 
 class RootError(RuntimeError):
@@ -104,11 +100,6 @@ class _Disc(NamedTuple):
         return complex(*(float(v) if abs(v) > self.radius else 0.0 for v in parts))
 
     @property
-    def size(self) -> int:
-        """How many roots there are in it and its conjugate."""
-        return self.number * (2 if self.has_conjugate else 1)
-
-    @property
     def roots(self) -> list[complex]:
         """The centre as often as there are roots in the disc, and its conjugate."""
         pair = [self.root, self.root.conjugate()] if self.has_conjugate else [self.root]
@@ -123,9 +114,8 @@ class _Balls:
     """F(s) / s^common in balls, as polynomials times exponentials."""
 
     def __init__(self, function: Function, common: int) -> None:
-        self.common, self.unit = common, 1.0 / (function.space.longest or 1.0)
-        self.parts = [(theta, _taylor(p)) for theta, p in function.by_delay]
-        self.rounded: dict[int, list[tuple[arb, list[acb_poly]]]] = {}
+        self.parts, self.common = function.by_delay, common
+        self.unit = 1.0 / function.space.longest
 
     def series(self, s: acb, number: int) -> list[acb]:
         """Return so many Taylor coefficients at s; at a ball around s = 0 those of F s^-common.
@@ -133,23 +123,12 @@ class _Balls:
         Those of a ball bound what is left of the series, times a power of the radius.
         """
         at_zero = self.common if s.contains(0) else 0
-        size = number + at_zero
-        found = [acb(0)] * size
-        if flint.ctx.prec not in self.rounded:
-            self.rounded[flint.ctx.prec] = [
-                (-arb(theta), [acb_poly(p) for p in derivatives])
-                for theta, derivatives in self.parts
-            ]
-        for late, derivatives in self.rounded[flint.ctx.prec]:
-            values = [p(s) for p in derivatives[:size]]
-            turns = [acb(1)]
-            if late != 0:
-                turns = [(s * late).exp()]
-                for k in range(1, size):
-                    turns.append(turns[-1] * late / k)
-            for k, turn in enumerate(turns):
-                for i, value in enumerate(values[: size - k]):
-                    found[i + k] += value * turn
+        size, total = number + at_zero, acb_poly([0])
+        for theta, p in self.parts:
+            late, value = arb(-theta), (-s * theta).exp()
+            turn = acb_poly([value * late**k / factorial(k) for k in range(size)])
+            total += acb_poly(p)(acb_poly([s, 1])) * turn
+        found = [total[k] for k in range(size)]
         found = found[at_zero:]
         for _ in range(self.common - at_zero):
             # Over s + x, one coefficient after the other.
@@ -157,13 +136,13 @@ class _Balls:
                 found[k] = (found[k] - (found[k - 1] if k else 0)) / s
         return found
 
-    def enclosed(self, start: complex, numbers: Iterable[int]) -> _Disc | None:
-        """Follow Newton's method to a disc with one of some numbers of roots, or None."""
+    def enclosed(self, start: complex) -> _Disc | None:
+        """Follow Newton's method to a disc with as few roots as possible, or None."""
         polished: dict[int, acb | None] = {}
-        for number, bits in itertools.product(numbers, _BITS):
+        for number, bits in itertools.product(range(1, 1 + _MOST_IN_A_DISC), _BITS):
             with flint.ctx.workprec(bits):
                 if bits not in polished:
-                    polished[bits] = self._polished(acb(start.real, abs(start.imag)))
+                    polished[bits] = self._polished(acb(start))
                 s = polished[bits]
                 if s is not None and (found := self._disc(s, number)):
                     return found
@@ -192,9 +171,8 @@ class _Balls:
         next_to_real = s == 0 or abs(s.imag) < _WIDEST * abs(s)
         if next_to_real and (found := self._holds(acb(s.real), number)):
             return found
-        s = acb(s.real, abs(s.imag))
-        found = self._holds(s, number)
-        return found if found and s.imag > found.radius else None
+        found = self._holds(acb(s.real, abs(s.imag)), number)
+        return found if found and found.centre.imag > found.radius else None
 
     def _holds(self, centre: acb, number: int) -> _Disc | None:
         """Return a disc around a centre with exactly so many roots, or None (Lemma 25)."""
@@ -218,113 +196,54 @@ class _Balls:
         return _Disc(centre, radius, number, centre.imag != 0)
 
 
-def _taylor(p: fmpq_poly) -> list[fmpq_poly]:
-    """Return a polynomial and its derivatives, each over the factorial of its order."""
-    found = [p]
-    while found[-1].degree() > 0:
-        found.append(found[-1].derivative() / len(found))
-    return found
-
-
-class _Line(NamedTuple):
-    """The function s -> F(s + sigma), as `Function.shifted` returns it, and its extent."""
-
-    space: Space
-    functions: inclusion.Functions
-    #: Up to about where roots can lie right of the line, in rad/s; inf past a chain's limit.
-    end: float
-    #: One turn of the longest delay that acts, in rad/s.
-    turn: float
-
-
 class _Search:
     """A search for roots of F / s^common, and how many steps it has taken."""
 
     def __init__(self, function: Function, common: int) -> None:
-        self.function, self.common, self.steps = function, common, 0.0
-        self.balls = _Balls(function, common)
-        self.unit = 1.0 / function.space.longest
-        self.further, self.points = _TURNS_FURTHER, 0
+        self.function, self.steps = function, 0.0
+        #: How many roots at s = 0 there are; these are known exactly.
+        self.at_zero = (function.lowest or (common,))[0] - common
+        self.common = common + self.at_zero
+        self.balls = _Balls(function, self.common)
+        self.unit, self.further = self.balls.unit, _TURNS_FURTHER
         own = function.space.arrays
         self.poles = np.unique(own.roots[own.present])
 
-    # Where an exponential overflows nothing is found.
-    @np.errstate(over="ignore", invalid="ignore")
-    def _line(self, sigma: float) -> _Line:
-        """Return the function on the line Re s = sigma."""
-        space, functions = self.function.shifted(sigma)
-        _, steady, delayed, uncertain = functions
-        end = float(space.confined_from(steady, delayed, uncertain)[0])
-        if np.isfinite(end) and not space.step:
-            end = _last_crossing(space, steady[0], delayed[0])
-        # Far to the right the longer delays no longer act.
-        acting = float(space.arrays.delays[delayed[0].any(axis=0)].max(initial=0.0))
-        turn = 2.0 * np.pi / (acting or space.longest)
-        return _Line(space, functions, end, turn)
-
-    def fine(self, root: complex) -> float:
-        """How far right of a root no other one lies, at most."""
-        return _FINE * max(abs(root.real), self.unit)
-
-    def first_line(self) -> float:
-        """Return a line just right of the limit of a neutral chain, or -inf without a chain.
-
-        Left of the limit no count is decided.
-        """
-        space, limits = self.function.space, self.function.limits
-        if space.step:
+    def limit(self) -> float:
+        """Return what real parts of a neutral chain tend to, or -inf without a chain."""
+        still, *late = self.function.limits
+        if self.function.space.step or not any(late):
             return -np.inf
-        if not limits[0]:
-            return np.inf
-        late = np.array([float(abs(c / limits[0])) for c in limits[1:]])
-        limit = chain.real_part_limit(space.lags, 1.0, late)
-        if not -_LARGEST_EXPONENT * self.unit <= limit < np.inf:
-            return limit if limit > 0.0 else -np.inf
-        step = 0.25 * self.fine(limit)
-        for _ in range(_MOST_DOUBLED):
-            if np.isfinite(self._line(limit + step).end):
-                return limit + step
-            step *= 2.0
-        return np.inf
+        if not still:
+            raise RootError(
+                "no root is the rightmost one: what is undelayed at the highest power of s is "
+                "zero",
+                complex(np.nan, np.nan),
+            )
+        sizes = np.array([float(abs(c / still)) for c in late])
+        return chain.real_part_limit(self.function.space.lags, 1.0, sizes)
 
-    def count(self, sigma: float, most: int) -> int:
+    def count(self, sigma: float, most: int = _MANY_STEPS) -> int:
         """Count the roots right of a line; below zero where that is not decided."""
-        line = self._line(sigma)
-        if not np.isfinite(line.end):
-            return UNCONFINED
         try:
-            found = decide.count(self.function, self.common, right_of=sigma, most=most)
+            return decide.count(self.function, self.common, right_of=sigma, most=most)
         except UndecidedError:
-            found = BOUNDARY
-        self.steps += min(line.end / line.turn, most) if found >= 0 else most
-        return found
-
-    def _moved(self, s: ComplexArray, known: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-        """Return where Newton's method leads for F over factors of known roots, and how far."""
-        with np.errstate(all="ignore"):
-            value, slope = self.function.value_and_slope(s)
-            away = (1.0 / np.subtract.outer(s, known)).sum(axis=1)
-            away = away + self.common / s if self.common else away
-            move = 1.0 / (slope / value - away)
-            move = np.where(value == 0.0, 0.0, move)
-            length = np.abs(move)
-        return s - move, np.where(np.isnan(length), np.inf, length)
+            self.steps += most
+            return BOUNDARY
 
     def candidates(self, sigma: float, most: int = _MOST_STARTS) -> ComplexArray:
         """Return where Newton's method leads from a line, the rightmost first."""
-        line = self._line(sigma)
-        end = line.end
-        if not line.space.step:
-            end = min(end, 1e3 * self.further * line.turn)
-            end += self.further * line.turn
-        begin = 1e-3 * _SLOWEST * line.turn
-        grid, move = inclusion.resolved(line.functions, begin, end, _MOST_POINTS)
-        self.points = grid.size
-        self.steps += self.points
+        space, functions = self.function.shifted(sigma)
+        turn = 2.0 * np.pi * self.unit
+        end = np.pi / space.step if space.step else _last_met(space, functions)
+        if not space.step:
+            end = min(end, 1e3 * self.further * turn) + self.further * turn
+        begin = 1e-3 * _SLOWEST * turn
+        grid, move = inclusion.resolved(functions, begin, end, _MOST_POINTS)
+        self.steps += grid.size
         s = sigma + 1j * grid
-        with np.errstate(all="ignore"):
-            move = move / (1.0 - self.common * move / s)
-            length = np.nan_to_num(np.abs(move), nan=np.inf)
+        move = move / (1.0 - self.common * move / s)
+        length = np.nan_to_num(np.abs(move), nan=np.inf)
         # From where a step of Newton's method is locally shortest: no root close to the line
         # lies between two of its points.
         wider = np.pad(length, 1, constant_values=np.inf)
@@ -332,230 +251,195 @@ class _Search:
         s = (s - move)[here]
         s = s[np.argsort(-s.real, kind="stable")][:most]
         # Next to lightly damped poles rounding may hide D; its roots there lie next to them.
-        s = np.append(s, self.poles + 1e-3j * _SLOWEST * line.turn)
-        return self._led(s, line.turn)
+        return self.led(np.append(s, self.poles + 1j * begin))
 
-    def _led(
-        self, s: ComplexArray, turn: float, known: ComplexArray | tuple[()] = ()
-    ) -> ComplexArray:
-        """Return where Newton's method comes close to a root, the rightmost first."""
+    def led(self, s: ComplexArray, known: Iterable[complex] = ()) -> ComplexArray:
+        """Return where Newton's method comes close to a root, the rightmost first.
+
+        Known roots are divided out.
+        """
         self.steps += _STEPS * s.size
+        divided = np.array([*known, *[0.0] * self.common], np.complex128)
         length = np.full(s.shape, np.inf)
         for _ in range(_STEPS):
-            s, length = self._moved(s, np.array(known, np.complex128))
+            value, slope = self.function.value_and_slope(s)
+            away = (1.0 / np.subtract.outer(s, divided)).sum(axis=1)
+            move = np.where(value == 0.0, 0.0, 1.0 / (slope / value - away))
+            s, length = s - move, np.abs(move)
         # Slow roots are far smaller than a turn.
-        close = np.minimum(1e-5 * turn, 1e-3 * np.abs(s) + _SLOWEST * turn)
-        found = s[length <= close]
+        turn = 2.0 * np.pi * self.unit
+        found = s[length <= np.minimum(1e-5 * turn, 1e-3 * np.abs(s) + _SLOWEST * turn)]
         return found[np.argsort(-found.real, kind="stable")]
 
-    def near(self, sigma: float) -> tuple[complex, float] | None:
-        """Return the rightmost root found near a line, and the real part of those equal to it.
-
-        Of these it is the one of lowest frequency.
-        """
+    def near(self, sigma: float) -> complex | None:
+        """Return the rightmost root near a line, of equal ones that of lowest frequency."""
         found = self.candidates(sigma)
         for top in found[:_MOST_TRIED]:
-            equal = found[found.real >= top.real - _FINEST * max(abs(top), self.unit)]
-            lowest = equal[np.argmin(np.abs(equal.imag))]
-            disc = self.balls.enclosed(complex(lowest), range(1, 1 + _MOST_IN_A_DISC))
-            if disc is not None:
-                return disc.root, disc.root.real + float(top.real - lowest.real)
+            least = top.real - 0.5 * _FINEST * max(abs(top), self.unit)
+            equal = found[found.real >= least]
+            lowest = complex(equal[np.argmin(np.abs(equal.imag))])
+            if disc := self.balls.enclosed(lowest):
+                return disc.root
         return None
 
-    def certified(self, root: complex, equal: float) -> complex | None:
-        """Return the root, or one between it and a line without roots on its right, or None."""
+    def is_rightmost(self, root: complex) -> bool:
+        """Whether a count just right of a root is zero."""
         finest = _FINEST * max(abs(root), self.unit)
-        fine = max(finest, self.fine(root))
-        count = self.count(equal + finest, _FEW_STEPS)
-        if count < 0:
-            count = self.count(equal + fine, _MANY_STEPS)
-            between = self.near(equal + fine) if count == 0 else None
-            if between is not None and between[0].real > root.real + finest:
-                root = between[0]
-        if count == 0 and 0.0 < abs(root.real) <= fine:
+        number = self.count(root.real + finest if root else 0.0, _FEW_STEPS)
+        if number < 0:
+            fine = max(finest, self.fine(root.real))
             # The side of the axis is that of the count.
-            count = self.count(0.0, _MANY_STEPS)
-            if count < 0:
-                return root if abs(root.real) <= finest else None
-            return root if (count > 0) == (root.real > 0.0) else None
-        return root if count == 0 else None
+            number = self.count(0.0 if -fine < root.real < 0.0 else root.real + fine)
+        return number == 0
 
+    def fine(self, real: float) -> float:
+        """How far right of a root of a real part no other one lies, at most."""
+        return _FINE * max(abs(real), self.unit)
+
+    @np.errstate(all="ignore")
+    def rightmost(self) -> complex:
+        """Return the rightmost root, or raise a `RootError`.
+
+        Line after line is tried. The counts on the lines enclose the root, so that the interval
+        between two lines is halved until it is found.
+        """
+        limit, best = self.limit(), complex(np.nan, np.nan)
+        # Left of this line, just right of the limit, no count is decided.
+        first = limit + 0.25 * self.fine(limit) if np.isfinite(limit) else limit
+        if self.at_zero and self.is_rightmost(0j):
+            return 0j
+        # There are roots right of `low`, as far as is decided, and none right of `high`.
+        low, high, sigma, width = -np.inf, np.inf, max(0.0, first), self.unit
+        small = _SLOWEST * self.unit
+        while self.steps < _ALL_STEPS and -_LARGEST_EXPONENT * self.unit < sigma:
+            root = self.near(sigma)
+            if self.at_zero and (root is None or root.real < 0.0):
+                root = 0j
+            # Next to the limit of a chain no count tells that roots lie right of `low`.
+            if root is not None and root.real + self.fine(root.real) > low:
+                best = root
+                if self.is_rightmost(root):
+                    return root
+                low = max(low, root.real)
+            if low < sigma < high:
+                number = self.count(sigma)
+                if number == UNCONFINED:
+                    break
+                low, high = (low, sigma) if number == 0 else (sigma, high)
+            if self.further == _MOST_TURNS_FURTHER:
+                break
+            self.further = min(2.0 * self.further, _MOST_TURNS_FURTHER)
+            if low > -np.inf and high < np.inf:
+                # Roots next to the axis may be slower than the delays by many decades.
+                sinhs = np.arcsinh(np.array([low, high]) / small)
+                sigma = float(small * np.sinh(0.5 * sinhs.sum()))
+            else:
+                sigma = low + width if low > -np.inf else high - width
+                width *= 4.0
+            # No root is known between the limit of a chain and `high`.
+            if -np.inf < low < first or sigma < first:
+                sigma = first
+            elif sigma in (low, high):
+                break
+        why = ""
+        if limit > -np.inf:
+            why = (
+                f": {'no' if high == first else 'perhaps a'} root lies right of Re s = "
+                f"{limit:.6g}, the limit that neutral root chains may tend to"
+            )
+        raise RootError(
+            f"no rightmost root could be certified{why}; the best candidate is {best}", best
+        )
+
+    @np.errstate(all="ignore")
     def right_of(self, sigma: float, number: int) -> list[_Disc]:
         """Return discs of all roots right of a line, of which there are so many, or of some."""
-        found, places, missing = list[_Disc](), np.zeros(0, np.complex128), number
+        found, places = list[_Disc](), np.zeros(0, np.complex128)
+        if self.at_zero and sigma < 0.0:
+            number -= self.at_zero
+        missing = number
 
-        def keep(starts: ComplexArray, numbers: Iterable[int]) -> bool:
+        def keep(starts: ComplexArray) -> bool:
             """Enclose what is new, and tell whether something was."""
             nonlocal places, missing
-            before, numbers = missing, list(numbers)
+            before = missing
             for start in starts.tolist():
                 there = complex(start.real, abs(start.imag))
-                if not missing or (np.abs(places - there) <= _SAME * abs(there)).any():
+                if missing <= 0 or (np.abs(places - there) <= _SAME * abs(there)).any():
                     continue
-                disc = self.balls.enclosed(there, numbers)
+                disc = self.balls.enclosed(there)
                 if disc is None or not disc.centre.real - disc.radius > sigma:
                     continue
                 # Discs are far smaller than this.
                 close = np.flatnonzero(np.abs(places - disc.root) <= 0.1 * abs(disc.root))
                 if not any(disc.meets(found[k]) for k in close):
                     found.append(disc)
-                    places, missing = np.append(places, disc.root), missing - disc.size
+                    places, missing = np.append(places, disc.root), missing - len(disc.roots)
             return missing < before
 
         turns, line = np.exp(2j * np.pi * (np.arange(6) + 0.3) / 6.0), sigma
         for k in range(_LINES):
-            candidates = self.candidates(line, max(2 * number, _MOST_STARTS))
-            keep(candidates, [1])
-            for _ in range(_ROUNDS):
+            new = keep(self.candidates(line, max(2 * number, _MOST_STARTS))) or not k
+            while missing > 0 and new:
                 # Newton's method for F over the factors of what is known leads elsewhere.
                 known = np.array([s for disc in found for s in disc.roots], np.complex128)
                 starts = np.concatenate((self.poles, known, [line]))
                 starts = starts[np.argsort(np.abs(starts - line))][: _MOST_STARTS // 6]
-                around = 0.3 * np.abs(starts) + 1e-9 * self.unit
-                starts = (starts[:, None] + around[:, None] * turns).ravel()
-                if missing <= 0 or not keep(self._led(starts, self.unit, known), [1]):
-                    break
-            if missing > 0:
-                keep(candidates, range(2, 1 + min(missing, _MOST_IN_A_DISC)))
+                around = np.abs(starts) + 1e-9 * self.unit
+                new = keep(self.led((starts[:, None] + around[:, None] * turns).ravel(), known))
             if missing <= 0 or self.steps > _ALL_STEPS:
                 break
             self.further = min(2.0 * self.further, _MOST_TURNS_FURTHER)
             line = sigma + 0.25 * self.unit * (2.0**k)
+        if self.at_zero and sigma < 0.0:
+            found.append(_Disc(acb(0), arb(0), self.at_zero, has_conjugate=False))
         return found
 
 
-def _last_crossing(space: Space, steady: FloatArray, delayed: FloatArray) -> float:
+def _last_met(space: Space, functions: inclusion.Functions) -> float:
     """Frequency up to which delayed terms are as large as all else, from samples.
 
     What a search finds depends on it, but no count.
     """
+    a, steady, delayed = space.arrays, functions.steady[0], functions.delayed[0]
     omega = np.geomspace(1e-3 * space.corners[0], 1e6 * space.corners[-1], 500)
-    weights = np.vstack((steady - delayed.sum(1), delayed.T))
-    still = np.zeros((*weights.shape, delayed.shape[1]))
-    functions = inclusion.Functions(space.arrays, weights, still, np.zeros_like(weights))
-    sizes = np.abs(inclusion.values(functions, omega))
-    met = np.flatnonzero(sizes[0] <= sizes[1:].sum(0))
-    return float(omega[min(met[-1] + 1, 499)]) if met.size else 2.0 * np.pi / space.longest
+    over = 1.0 / (omega + a.scale[:, None])
+    factors = np.where(a.present[..., None], (1j * omega - a.roots[..., None]) * over, over)
+    p = a.lead[:, None] * factors.prod(axis=1)
+    late = np.abs(delayed.T @ p).sum(axis=0)
+    met = np.flatnonzero(np.abs((steady - delayed.sum(axis=1)) @ p) <= late)
+    return float(omega[min(met[-1] + 1, 499)]) if met.size else 0.0
 
 
 def _of_polynomial(function: Function, common: int) -> list[_Disc] | None:
     """Return all roots of a function without delays, or of a map of low degree; else None.
 
-    Those of a map are logarithms of the roots of one polynomial of exp(s step).
+    Those of a map are logarithms of the roots of one polynomial of exp(s step). It tells slow
+    poles apart, which rounding hides from a count.
     """
-    step, parts = function.space.step, function.by_delay
-    if not step and any(theta for theta, _ in parts):
+    step, p = function.space.step, fmpq_poly([0])
+    if not step and any(theta for theta, _ in function.by_delay):
         return None
-    backs = [whole_steps("delay", float(theta), step) if step else 0 for theta, _ in parts]
-    most = max(backs, default=0)
-    if most > _LARGEST_MAP:
-        return None
-    p = fmpq_poly([0])
-    for back, (_, part) in zip(backs, parts, strict=True):
-        p += part * fmpq_poly([0, 1]) ** (most - back)
+    for theta, part in function.by_delay:
+        back = whole_steps("delay", float(theta), step) if step else 0
+        if back > _LARGEST_MAP:
+            return None
+        # Of a map this is a polynomial of 1 / z.
+        p += part * fmpq_poly([0, 1]) ** back
     p //= fmpq_poly([-1 if step else 0, 1]) ** common
-    if step and p:
-        p //= fmpq_poly([0, 1]) ** order(p.coeffs())
-    if p.degree() < 1:
-        return []
     found = []
     with flint.ctx.workprec(_BITS[0]):
-        for z, number in enclosed_roots(p):
-            if z.imag < 0:
+        for root, number in enclosed_roots(p) if p.degree() > 0 else ():
+            if root.imag < 0:
                 continue
-            ball = z
+            s, own = root, root.imag.contains(0)
             if step:
-                flips = z.real < 0 and z.imag.contains(0)
-                ball = (-z if flips else z).log() / arb(step)
-                ball = acb(ball.real, arb.pi() / arb(step)) if flips else ball
-            radius = abs(acb(ball.real.rad(), ball.imag.rad())).upper()
-            has_conjugate = not z.imag.contains(0)
-            found.append(_Disc(ball.mid(), arb(radius), number, has_conjugate))
+                # Next to the negative real axis the angle of a root jumps.
+                s = -(-root if own and root.real < 0 else root).log() / arb(step)
+                s = acb(s.real, arb.pi() / arb(step) if own and root.real < 0 else -s.imag)
+            radius = abs(acb(s.real.rad(), s.imag.rad())).upper()
+            found.append(_Disc(s.mid(), arb(radius), number, not own))
     return sorted(found, key=lambda disc: (-disc.root.real, disc.root.imag))
-
-
-def rightmost_zero(function: Function, common: int = 0) -> complex:
-    """Return the root of F / s^common with the largest real part.
-
-    Line after line is tried. The rightmost root near a line is the one if a count just right of
-    it is zero. The counts on the lines enclose it, so that the interval between two lines is
-    halved until it is found.
-
-    Raises
-    ------
-    ValueError
-        If the function has no roots because it is constant.
-    RootError
-        If no root is certified.
-    """
-    if not function.delayed.any():
-        return _first(_of_polynomial(function, common))
-    if function.lowest and function.lowest[0] > common:
-        # One at s = 0 is exact, however many coincide there.
-        with suppress(UndecidedError):
-            if decide.count(function, function.lowest[0]) == 0:
-                return 0j
-    try:
-        return _searched(function, common)
-    except RootError:
-        # Rounding may hide what the exact polynomial of a map tells.
-        all_of_map = _of_polynomial(function, common)
-        if all_of_map is None:
-            raise
-    return _first(all_of_map)
-
-
-def _first(discs: list[_Disc] | None) -> complex:
-    """Return the rightmost root of a polynomial."""
-    if not discs:
-        raise ValueError("the parameters must leave a loop with roots: D is constant")
-    return discs[0].root
-
-
-def _searched(function: Function, common: int) -> complex:
-    """Do what `rightmost_zero` does, by lines."""
-    search, best = _Search(function, common), complex(np.nan, np.nan)
-    # There are roots right of `low`, as far as is decided, and none right of `high`.
-    first = search.first_line()
-    low, high, sigma, width = -np.inf, np.inf, max(0.0, first), search.unit
-    small, why = _SLOWEST * search.unit, ""
-    if first == np.inf:
-        why = ": what is undelayed at the highest power of s is zero, or as rounding has it"
-    while search.steps < _ALL_STEPS and -_LARGEST_EXPONENT * search.unit < sigma < np.inf:
-        found = search.near(sigma)
-        # Next to the limit of a chain no count tells that roots lie right of `low`.
-        if found and found[0].real + search.fine(found[0]) > low:
-            best = found[0]
-            root = search.certified(*found)
-            if root is not None:
-                return root
-            low = max(low, best.real)
-        if low < sigma < high:
-            if search.count(sigma, _MANY_STEPS) == 0:
-                high = sigma
-            else:
-                low = sigma
-        if high == first and search.points > _ENOUGH_POINTS:
-            why = (
-                f": no root lies right of Re s = {first:.6g}, the limit that neutral root "
-                "chains may tend to"
-            )
-            break
-        search.further = min(2.0 * search.further, _MOST_TURNS_FURTHER)
-        if low > -np.inf and high < np.inf:
-            # Roots next to the axis may be slower than the delays by many decades.
-            sigma = float(small * np.sinh(0.5 * sum(np.arcsinh(np.array([low, high]) / small))))
-        else:
-            sigma = low + width if low > -np.inf else high - width
-            width *= 4.0
-        # No root is known between the limit of a chain and `high`.
-        if -np.inf < low < first or sigma < first:
-            sigma = first
-        elif sigma in (low, high):
-            break
-    raise RootError(
-        f"no rightmost root could be certified{why}; the best candidate is {best}", best
-    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -610,7 +494,8 @@ class CharacteristicRoots(Shown):
             if s.imag >= 0.0:
                 real, omega = shown(s.real, "rad/s"), shown(s.imag, "rad/s")
                 rows.append((real, omega, shown(damping), shown(time, "s")))
-        return Table(f"{len(self)} roots right of Re s = {self.right_of:g} rad/s", rows)
+        title = f"{len(self)} roots right of Re s = {self.right_of:g} rad/s"
+        return Table(title, rows if len(self) else [])
 
     def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
         """Draw the roots, the line, and the region right of it, in which there are no others.
@@ -676,37 +561,17 @@ def characteristic_roots(
     >>> from armlock import CommonArm, characteristic_roots
     >>> print(characteristic_roots(CommonArm(), right_of=-0.004))
     4 roots right of Re s = -0.004 rad/s
-      real part    frequency  damping  time constant
-          rad/s        rad/s                       s
-    -5.8964e-04   3.0655e-01   0.0019     1.6960e+03
-    -2.2894e-03   6.1342e-01   0.0037     4.3679e+02
+      real part           frequency       damping     time constant
+      -0.000589639 rad/s  0.306552 rad/s  0.00192345  1695.95 s
+      -0.00228944 rad/s   0.613422 rad/s  0.00373222  436.788 s
     """
     sigma = real_number("right_of", right_of)
     system, points, shape = at_points(system, values, numbers)
     if shape:
         raise ValueError(f"parameters must be numbers, got arrays of the shape {shape}")
     n, m = system.functions(points[0].tolist())
-    discs = _all_right_of(n, m, sigma, points[0])
-    found = [(s, float(disc.radius)) for disc in discs for s in disc.roots]
-    found.sort(key=lambda pair: (-pair[0].real, abs(pair[0].imag), -pair[0].imag))
-    return CharacteristicRoots(
-        np.array([s for s, _ in found], np.complex128),
-        np.array([r for _, r in found], np.float64),
-        sigma,
-    )
-
-
-def _all_right_of(n: Function, m: Function, sigma: float, point: FloatArray) -> list[_Disc]:
-    """Return discs of all roots of a loop right of a line, or raise."""
-    function, common = n + m, common_zeros(n, m)
-    discs = _of_polynomial(function, common)
-    if discs is not None:
-        on_line = any(abs(disc.centre.real - sigma) <= disc.radius for disc in discs)
-        number = sum(disc.size for disc in discs if disc.centre.real > sigma)
-        number = BOUNDARY if on_line else number
-    else:
-        with decided("no roots", point):
-            number = count_exactly(n, m, sigma)
+    with decided("no roots", points[0]):
+        number = count_exactly(n, m, sigma)
     if number == UNCONFINED:
         raise ValueError(
             f"right_of must lie right of the limit of the neutral chain, got {sigma:g}: "
@@ -714,23 +579,31 @@ def _all_right_of(n: Function, m: Function, sigma: float, point: FloatArray) -> 
         )
     if number == BOUNDARY:
         raise CountError(
-            f"no roots{place(point)}: one lies on the line Re s = {sigma:g}, or nearer to it "
-            "than rounding can tell",
-            point[None],
+            f"no roots{place(points[0])}: one lies on the line Re s = {sigma:g}, or nearer to "
+            "it than rounding can tell; choose another right_of",
+            points,
         )
-    if discs is None and function.space.step:
-        raise ValueError(f"system must have at most {_LARGEST_MAP} steps in its longest delay")
     if number > _MOST_ROOTS:
         raise ValueError(
             f"right_of must leave at most {_MOST_ROOTS} roots, got {sigma:g} with {number}"
         )
+    discs = _of_polynomial(n + m, common_zeros(n, m))
     if discs is not None:
-        return [disc for disc in discs if disc.centre.real > sigma]
-    found = _Search(function, common).right_of(sigma, number) if number else []
-    if (size := sum(disc.size for disc in found)) != number:
-        estimate = np.array([s for disc in found for s in disc.roots])
-        raise RootError(f"{size} of {number} roots right of {sigma:g} are found", estimate)
-    return found
+        discs = [disc for disc in discs if disc.centre.real > sigma]
+    elif n.space.step:
+        raise ValueError(f"system must have at most {_LARGEST_MAP} steps in its longest delay")
+    else:
+        discs = _Search(n + m, common_zeros(n, m)).right_of(sigma, number)
+    found = [(s, float(disc.radius)) for disc in discs for s in disc.roots]
+    found.sort(key=lambda pair: (-pair[0].real, abs(pair[0].imag), -pair[0].imag))
+    roots = np.array([s for s, _ in found], np.complex128)
+    if roots.size != number:
+        raise RootError(
+            f"{roots.size} of {number} roots right of {sigma:g} are found; choose another "
+            "right_of",
+            roots,
+        )
+    return CharacteristicRoots(roots, np.array([r for _, r in found], np.float64), sigma)
 
 
 def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> Any:
@@ -765,12 +638,10 @@ def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayL
     Certified means that a small disc around s holds a root (Lemma 25), and that no root is
     counted right of Re s + m. Here m is 1e-11 of |s| or of one
     over the longest delay, whichever is larger. Where so fine a count is not decided, m is 1e-6
-    of |Re s| or of one over the longest delay. Roots whose real parts differ by less than the
-    first m count as equal, and the one of lowest frequency that was found is returned.
-
-    The sign of a real part smaller than the second m is one that `unstable_roots` confirms.
-    Where that count is not decided, the root is refused unless its real part is smaller than
-    the first m.
+    of |Re s| or of one over the longest delay, and a root less than m left of the imaginary
+    axis is certified by a count right of the axis. Roots whose real parts differ by less than
+    half of the first m count as equal, and the one of lowest frequency that was found is
+    returned.
 
     The real parts on a neutral root chain may tend to a limit that none of them reaches. Where
     no root lies right of it, a root up to m left of the limit is returned. If none is found
@@ -794,5 +665,20 @@ def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayL
     found = []
     for point in points.tolist():
         n, m = system.functions(point)
-        found.append(rightmost_zero(n + m, common_zeros(n, m)))
+        found.append(_rightmost(n + m, common_zeros(n, m)))
     return np.array(found, np.complex128).reshape(shape) if shape else found[0]
+
+
+def _rightmost(function: Function, common: int) -> complex:
+    """Return the root of F / s^common with the largest real part."""
+    discs = None if function.delayed.any() else _of_polynomial(function, common)
+    if discs is None:
+        try:
+            return _Search(function, common).rightmost()
+        except RootError:
+            discs = _of_polynomial(function, common)
+            if discs is None:
+                raise
+    if not discs:
+        raise ValueError("the parameters must leave a loop with roots: D is constant")
+    return discs[0].root
