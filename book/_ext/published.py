@@ -19,14 +19,9 @@ LAUNCHERS = {
 
 
 def project_url():
-    """Return where the sources are published, if the package's metadata say so."""
-    try:
-        entries = metadata.metadata("armlock").get_all("Project-URL") or []
-    except metadata.PackageNotFoundError:
-        return None
-    addresses = {k.lower(): v for k, _, v in (entry.partition(", ") for entry in entries)}
-    found = [addresses[k] for k in ("source", "repository", "homepage") if k in addresses]
-    return found[0].rstrip("/") if found else None
+    """Return where the sources are published, or nothing."""
+    entries = metadata.metadata("armlock").get_all("Project-URL") or []
+    return dict(entry.split(", ") for entry in entries).get("repository", "").rstrip("/")
 
 
 class Published(SphinxDirective):
@@ -37,7 +32,7 @@ class Published(SphinxDirective):
     def run(self):
         """Return the content with the address in it."""
         address = project_url()
-        if address is None:
+        if not address:
             return []
         return self.parse_text_to_nodes("\n".join(self.content).replace("ADDRESS", address))
 
