@@ -672,6 +672,24 @@ def test_numbers_and_sliders_stay_in_sight(opened, window):
     )
 
 
+@pytest.mark.parametrize("window", WINDOWS[:1], ids=str)
+def test_no_number_that_the_keyboard_reaches_lies_under_the_panel(opened):
+    page = opened()
+    start(page, "Dual arm")
+    table(page)
+    page.evaluate("scrollTo(0, document.body.scrollHeight)")
+    for key in ("Shift+Tab", "Tab"):
+        for _ in range(25):
+            page.keyboard.press(key)
+            hidden = page.evaluate(
+                """() => { const e = document.activeElement, b = e.getBoundingClientRect();
+                const over = document.elementFromPoint(b.x + b.width / 2, b.y + b.height / 2);
+                return e.matches('input') && !e.closest('.live-panel') && over
+                    && over.closest('.live-panel') && e.id; }"""
+            )
+            assert not hidden
+
+
 PRINTED = """<TransferFunction>: sys[1]
 Inputs (1): ['u[0]']
 
