@@ -260,9 +260,9 @@ def critical_perturbation(loop: System, direction: Point) -> float:
         parameter has no nominal value, the loop is not affine along the ray, or unstable at
         the nominal values themselves. A boundary point is allowed there.
     CountError
-        If rounding, or the steps allowed, do not decide it, or the counts on the two sides of
-        the result contradict it. So far away as 1e8 a count may take too many steps:
-        `first_crossing` with a `stop` then tells what happens up to there.
+        If rounding, or the steps allowed, do not decide it, or the count half way to the result
+        contradicts it. So far away as 1e8 a count may take too many steps: `first_crossing`
+        with a `stop` then tells what happens up to there.
 
     See Also
     --------
@@ -295,23 +295,16 @@ def critical_perturbation(loop: System, direction: Point) -> float:
         begin = ray.begin()
         if begin and ray.count(begin) > 0:
             return 0.0
-        u, omega = ray.first(begin, _FARTHEST)
-        counts = [ray.count(0.5 * min(u, _FARTHEST))]
-        # So close to the result, rounding may hide on which side of the boundary a point is;
-        # and next to the limit of the chain, roots cross that are not looked for.
-        shares = (1e-4, 1e-3) if omega == np.inf else (1e-6, 1e-5, 1e-4, 1e-3)
-        for share in shares if u < np.inf else ():
-            counts[1:] = [ray.count(u * (1.0 + way * share)) for way in (-1.0, 1.0)]
-            if BOUNDARY not in counts[1:]:
-                break
-    eps = u * ray.scale
-    if any(counts[:2]) or counts[2:] in ([0], [BOUNDARY]):
+        u, _ = ray.first(begin, _FARTHEST)
+        # Roots that are on the axis at the start may stay there.
+        half = 0.5 * min(u, _FARTHEST)
+        on_the_way = ray.count(half)
+    if on_the_way != 0:
         raise CountError(
-            f"the first crossing along {tuple(ray.way.tolist())} lies at {eps}, but counts on "
-            f"the way there and past it contradict it: {counts}",
-            ray.point(min(u, _FARTHEST))[None],
-        )
-    return eps
+            f"the first crossing along {tuple(ray.way.tolist())} lies at {u * ray.scale}, but "
+            f"half way there the count is {on_the_way}", ray.point(half)[None],
+        )  # fmt: skip
+    return u * ray.scale
 
 
 def box_count(loop: System, size: float) -> int:
