@@ -7,12 +7,11 @@ roots and the number P of unstable poles of L. The samples of the curve are for 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray, positive_number
 from armlock.engine import decide
@@ -44,36 +43,6 @@ _AGREED = 1e-3
 _SHOWN = 10
 # The share of a leading term that all others are at most, where a picture begins.
 _NEGLIGIBLE = 5e-4
-
-
-class _Path(NamedTuple):
-    """Where a curve is drawn: the loop at its parameters, and from which frequency to which."""
-
-    loop: System
-    point: dict[str, Any]
-    space: Space
-    per_turn: float
-    start: float
-    end: float
-
-    def response(self, s: npt.ArrayLike) -> ComplexArray:
-        """Evaluate L."""
-        return self.loop(s, **self.point)
-
-    def omega(self) -> FloatArray:
-        """Frequencies close enough to draw the curve; finer at first, and around resonances.
-
-        Past a thousand turns of the delays no picture shows one turn beside the next.
-        """
-        per_turn, start, end = self.per_turn, self.start, self.end
-        first = np.arange(0.0, min(4.0 * per_turn, end), per_turn / 2000.0)
-        resolved = min(1000.0 * per_turn, end)
-        whole = np.arange(0.0, resolved, per_turn / 400.0)
-        far = np.geomspace(resolved, end, 100_000) if end > resolved else whole[:0]
-        around = self.space.around_roots()
-        grids = np.geomspace(start, end, 4000), first, whole, far, around, [end]
-        every = np.concatenate(grids)
-        return np.unique(every[(every >= start) & (every <= end)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,28 +81,45 @@ class NyquistCurve(Shown):
     encirclements: int
     open_loop_poles: int
     closed_loop_roots: int
-    _path: _Path = field(repr=False)
+    # The loop with its parameters, one turn of its delays, and between which frequencies it is
+    # drawn.
+    _loop: System
+    _space: Space
+    _per_turn: float
+    _start: float
+    _end: float
 
     @cached_property
     def omega(self) -> FloatArray:
-        """Frequencies, which are found when they are read."""
-        return self._path.omega()
+        """Frequencies, which are found when they are read; finer at first and at resonances.
+
+        Past a thousand turns of the delays no picture shows one turn beside the next.
+        """
+        per_turn, start, end = self._per_turn, self._start, self._end
+        first = np.arange(0.0, min(4.0 * per_turn, end), per_turn / 2000.0)
+        resolved = min(1000.0 * per_turn, end)
+        whole = np.arange(0.0, resolved, per_turn / 400.0)
+        far = np.geomspace(resolved, end, 100_000) if end > resolved else whole[:0]
+        around = self._space.around_roots()
+        grids = np.geomspace(start, end, 4000), first, whole, far, around, [end]
+        every = np.concatenate(grids)
+        return np.unique(every[(every >= start) & (every <= end)])
 
     @cached_property
     def response(self) -> ComplexArray:
         """L on the axis, which is computed when it is read."""
-        return self._path.response(1j * self.omega)
+        return self._loop(1j * self.omega)
 
     @cached_property
     def indentation(self) -> ComplexArray:
         """The quarter circle around s = 0."""
         angle = 0.5 * np.pi * np.linspace(0.0, 1.0, 64 if self.pole_order else 0)
-        return np.asarray(self._path.start * np.exp(1j * angle))
+        return np.asarray(self._start * np.exp(1j * angle))
 
     @cached_property
     def indentation_response(self) -> ComplexArray:
         """L on the quarter circle."""
-        return self._path.response(self.indentation)
+        return self._loop(self.indentation)
 
     def _table(self) -> Table:
         """Show the numbers of the theorem first."""
@@ -298,13 +284,16 @@ def nyquist(
     if omega_max is not None:
         end = max(end, positive_number("omega_max", omega_max))
     given = System.of(loop)
-    numbers = dict(zip(given.parameters, point.tolist(), strict=True))
     return NyquistCurve(
         pole_order=order,
         encirclements=count - poles,
         open_loop_poles=poles,
         closed_loop_roots=count,
-        _path=_Path(given, numbers, n.space, 2.0 * np.pi / longest, radius, end),
+        _loop=given.at(**dict(zip(given.parameters, point.tolist(), strict=True))),
+        _space=n.space,
+        _per_turn=2.0 * np.pi / longest,
+        _start=radius,
+        _end=end,
     )
 
 
