@@ -296,7 +296,7 @@ def test_a_curve_is_computed_when_it_is_read(monkeypatch):
         raise AssertionError("the curve was computed")
 
     with monkeypatch.context() as patched:
-        patched.setattr(Loop, "__call__", refused)
+        patched.setattr(System, "__call__", refused)
         curve = nyquist(paper_loop())
         assert curve.encirclements == 0
         with pytest.raises(AssertionError, match="was computed"):
