@@ -397,8 +397,8 @@ class System:
         name : str, optional
             What an error calls it.
         integrators : int, optional
-            How many poles of a python-control system are zero: 0, 1 or 2. It is needed where
-            rounding may have moved such poles.
+            How many poles of a python-control system are zero. It is needed where rounding may
+            have moved such poles.
         zeros : int, optional
             The same for its zeros, for instance 1 for a high-pass filter, or for an integrator
             that the input does not reach.
