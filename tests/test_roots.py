@@ -505,3 +505,21 @@ def test_what_is_no_list_of_roots_is_refused_with_its_reason():
     with pytest.raises(ValueError, match=r"^parameters must be numbers"):
         characteristic_roots(HayesEquation(), [0.0, 1.0], -1.0, right_of=0.0)
     assert len(characteristic_roots(CommonArm(), right_of=0.0)) == 0
+
+
+def test_a_root_that_lies_on_the_line_is_answered_by_another_line():
+    tenth = equation((s + Fraction(1, 10)) * (s + 2 + 0.1 * delay(1.0)))
+    # As floats, -0.1 and -1 / 10 differ by 6e-18.
+    with pytest.raises((CountError, RootError), match="choose another right_of"):
+        characteristic_roots(tenth, right_of=-0.1)
+    assert characteristic_roots(tenth, right_of=-0.11).values == pytest.approx([-0.1])
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_root_at_zero_is_exact_and_listed(number):
+    others = s + 1 + 0.5 * delay(1.0)
+    rest = characteristic_roots(equation(others), right_of=-2.5).values
+    found = characteristic_roots(equation(s**number * others), right_of=-2.5).values
+    assert found[:number].tolist() == [0.0] * number
+    np.testing.assert_allclose(found[number:], rest, rtol=1e-12)
+    assert rightmost_root(equation(s**number * others)) == 0.0

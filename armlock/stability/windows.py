@@ -7,13 +7,13 @@ lengths at which the number of unstable roots can change is complete.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import factorial
 from typing import NamedTuple
 
 import flint
 import numpy as np
-from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_mpoly_ctx, fmpq_poly
+from flint import acb, acb_poly, arb, fmpq, fmpq_mpoly_ctx, fmpq_poly
 
 from armlock.checks import positive_number
 from armlock.engine.polynomials import collected, enclosed_roots, exact
@@ -132,43 +132,32 @@ def _with_length(system: System, parts: Sequence[dict[int, fmpq_poly]], theta: f
     return System(n, m, at_zero=system.at_zero)
 
 
-def _resultant(powers: Sequence[fmpq_poly], s: fmpq) -> fmpq:
-    """Return the resultant of P(s, z) and z^K P(-s, 1 / z) at a real s, Sylvester's."""
-    number = len(powers) - 1
-    rows = [[p(s) for p in powers][::-1], [p(-s) for p in powers]]
-    matrix = fmpq_mat(2 * number, 2 * number)
-    for i in range(2 * number):
-        for k, value in enumerate(rows[i // number]):
-            matrix[i, i % number + k] = value
-    return matrix.det()
+def _factors(
+    powers: Sequence[fmpq_poly],
+) -> Iterator[tuple[list[fmpq_poly], fmpq_poly]]:
+    """Yield the irreducible factors of P(s, z) that hold z, by powers of z.
 
-
-def _eliminated(powers: Sequence[fmpq_poly]) -> fmpq_poly:
-    """Return the resultant as a polynomial of s^2, from its values at whole numbers s."""
-    size = (len(powers) - 1) * max(p.degree() for p in powers) + 1
-    at = [fmpq(k * k) for k in range(size)]
-    found, basis = fmpq_poly([0]), fmpq_poly([1])
-    for k in range(size):
-        left = _resultant(powers, fmpq(k)) - found(at[k])
-        found += basis * (left / basis(at[k]))
-        basis *= fmpq_poly([-at[k], 1])
-    return found
-
-
-def _factors(powers: Sequence[fmpq_poly]) -> list[list[fmpq_poly]]:
-    """Return the irreducible factors of P(s, z) that hold z, by powers of z."""
+    With each, the resultant of P(s, z) and z^K P(-s, 1 / z) as a polynomial of s^2.
+    """
+    ring = fmpq_mpoly_ctx.get(("s", "z"))
     terms: dict[tuple[int, ...], fmpq] = {
         (i, k): c for k, p in enumerate(powers) for i, c in enumerate(p.coeffs()) if c
     }
-    whole = fmpq_mpoly_ctx.get(("s", "z")).from_dict(terms)
-    found = []
-    for factor, _ in whole.factor()[1]:
-        rows = collected(
-            (int(k), fmpq_poly([0] * int(i) + [c])) for (i, k), c in factor.to_dict().items()
-        )
-        if max(rows):
-            found.append([rows.get(k, fmpq_poly([0])) for k in range(max(rows) + 1)])
-    return found
+    for factor, _ in ring.from_dict(terms).factor()[1]:
+        number = factor.degrees()[1]
+        if number:
+            own = [(int(i), int(k), c) for (i, k), c in factor.to_dict().items()]
+            mirror = ring.from_dict({(i, number - k): (-1) ** i * c for i, k, c in own})
+            resultant = factor.resultant(mirror, "z").to_dict()
+            yield (
+                [_polynomial({i: c for i, n, c in own if n == k}) for k in range(number + 1)],
+                _polynomial({int(i) // 2: c for (i, _), c in resultant.items()}),
+            )
+
+
+def _polynomial(terms: dict[int, fmpq]) -> fmpq_poly:
+    """Return a polynomial by its powers."""
+    return fmpq_poly([terms.get(k, 0) for k in range(max(terms, default=0) + 1)])
 
 
 def _edges(
@@ -179,15 +168,11 @@ def _edges(
 ) -> list[float]:
     """Return the lengths up to the longest at which a root is on the axis, ascending."""
     found = _at_zero(powers, parts, at_zero, arb(longest))
-    for factor in _factors(powers):
-        for root, _ in enclosed_roots(_eliminated(factor)(fmpq_poly([0, -1]))):
+    for factor, eliminated in _factors(powers):
+        for root, _ in enclosed_roots(eliminated(fmpq_poly([0, -1]))):
             if root.imag.contains(0) and root.real > 0:
                 found += _lengths(factor, root.real.sqrt(), arb(longest))
     found.sort(key=lambda theta: float(theta.mid()))
-    if len(found) > _MOST_WINDOWS:
-        raise ValueError(
-            f"longest must leave at most {_MOST_WINDOWS} windows, got {len(found)}"
-        )
     return [
         float(theta)
         for k, theta in enumerate(found)
@@ -212,7 +197,9 @@ def _lengths(powers: Sequence[fmpq_poly], omega: arb, longest: arb) -> list[arb]
         first = first if first > 0 else first + turn
         number = int(float((longest * omega - first) / turn)) + 2
         if number > _MOST_WINDOWS:
-            raise ValueError(f"longest must leave at most {_MOST_WINDOWS} windows")
+            raise ValueError(
+                f"longest must leave at most {_MOST_WINDOWS} windows, got {float(longest):g}"
+            )
         lengths = ((first + k * turn) / omega for k in range(max(number, 0)))
         found += [theta for theta in lengths if theta < longest]
     return found
