@@ -1,9 +1,10 @@
 """What is decided on the imaginary axis: counts, and whether a family of functions has a zero.
 
-`count` follows the argument of one function. `Family` states functions of which none may have
-a zero, up to a level; `least` finds the largest level at which none has. Where double
-precision does not decide, a count is `BOUNDARY`, and a search raises an `UndecidedError`
-(`armlock.engine.tolerances`).
+`count` follows the argument of one function along the axis, and so counts its zeros right of
+it. A `Family` is a set of functions that grows with a number, the level: a gain, an angle, a
+delay. `least` finds the largest level at which none of them has a zero on the axis, `excludes`
+tells whether none has one at the level zero. Where double precision does not decide, a count is
+`BOUNDARY`, and a search raises an `UndecidedError` (`armlock.engine.tolerances`).
 """
 
 from __future__ import annotations
@@ -209,6 +210,9 @@ def count(
 class Family:
     """Functions of which none has a zero if one test holds at each frequency.
 
+    For instance M + k N, with gains k from 1 to the level: zero must not be between the
+    vertices M + N and M + level N.
+
     Attributes
     ----------
     functions : sequence of Function
@@ -329,7 +333,7 @@ class Family:
         steady, delayed = stacked(self.functions[:1])
         limits = np.column_stack(self.space.limits(*stacked(self.functions[:2])))
         loose = sum(f.size_at_infinity for f in self.functions[2:])
-        reserve = chain.arc_reserve(self.space.lags, limits[1], limits[0], angle, loose)
+        reserve = chain.arc_reserve(limits[1], limits[0], angle, loose)
         more = sum((f.sizes for f in others), np.zeros(steady.shape[1]))
         return float(
             self.space.confined_from(steady, delayed, extra=more, reserve=reserve).max()

@@ -4,17 +4,25 @@ A space holds polynomials p_j and delays theta_k, and a function of the space is
 
     F(s) = sum_j p_j(s) [S_j + sum_k W_jk (exp(-s theta_k) - 1)] .
 
-On the interval s = j (m + r t) with -1 <= t <= 1, F is enclosed by F_0 + F_1 t + F_2 t^2 +
-F_3 t^3, terms C_k(t) of any phase, and a remainder. The lemmas are those of the book's appendix
-"The lemmas behind a count". All polynomials are divided by one positive number for each
+*The enclosure* (`enclose`). On the interval s = j (m + r t) with -1 <= t <= 1, F is enclosed by
+F_0 + F_1 t + F_2 t^2 + F_3 t^3, by terms C_k(t) of any phase for exponentials that turn too
+fast there, and by a remainder. All polynomials are divided by one positive number for each
 interval, so that arguments and signs remain.
 
-In order: the enclosure; whether it excludes zero; and the walks along the axis, which halve
-intervals until each is decided. An interval that double precision does not halve any more is
-undecided (`_halve`, and `armlock.engine.tolerances`). All compiled code of the engine is in
-this module, because numba compiles a function again when its own file or a number that it
-imports changes, but not when the file of a function it calls does. Pass no literal number to a
-function: numba would compile the function again for this number.
+*Whether zero is excluded* (`excludes_zero`). A test has vertices and terms, combinations of
+enclosed functions. Zero is excluded if all vertices lie on one side of a line through zero,
+farther from it than all terms together reach. The line may turn along the interval.
+
+*The walks.* `wind` adds up the angles by which a function turns, from which a count follows.
+`walk` looks for the least level at which a family has a zero, and `cross` for all zeros of the
+rows of a chart. `resolved` only samples a function. Each of them halves intervals until each is
+decided. An interval that double precision does not halve any more is undecided (`_halve`, and
+`armlock.engine.tolerances`).
+
+The lemmas are those of the book's appendix "The lemmas behind a count". All compiled code of
+the engine is in this module, because numba compiles a function again when its own file or a
+number that it imports changes, but not when the file of a function it calls does. Pass no
+literal number to a function: numba would compile the function again for this number.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 By the argument principle along s = j omega (`armlock.engine.decide.counts`), up to a frequency
 past which no root can cross. Points are counted with rounded weights and a bound of their
 error. A point that this leaves undecided is counted again with exact weights, from which the
-behaviour at s = 0 is known.
+behaviour at s = 0 is known. What -1, -2 and -3 mean, and the tolerances behind them, stands in
+`armlock.engine.tolerances`.
 """
 
 from __future__ import annotations
