@@ -25,6 +25,8 @@ _OFF_A_DELAY, _OFF_A_STEP = 1e-9, 1e-3
 
 def real_number(name: str, value: object) -> float:
     """Return `value` as a float, or say why it is not a finite real number."""
+    if type(value) is float and math.isfinite(value):
+        return value
     array = _numbers(name, value, _REAL)
     if array.ndim != 0:
         raise TypeError(f"{name} must be a real number, got {value!r}")

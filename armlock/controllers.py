@@ -64,11 +64,11 @@ def table_two(gain: float = paper.CONTROLLER_GAIN, *, denominator: str = "table"
         If the gain is not positive and finite, or `denominator` is neither.
     """
     one_of("denominator", denominator, ("table", "printed"))
-    zeros = [-z for z in paper.TABLE_2_ZEROS]
-    poles = [-p for p in paper.TABLE_2_POLES]
+    zeros = [0.0, 0.0, *(-z for z in paper.TABLE_2_ZEROS)]
+    poles = [*[-paper.TABLE_2_STAGE_1_POLE] * 2, *(-p for p in paper.TABLE_2_POLES)]
     if denominator == "printed":
         zeros, poles = zeros[:-1], poles[:-1]
-    return stage_one(gain) * Controller(zeros, poles, 1.0)
+    return Controller(zeros, poles, positive_number("gain", gain))
 
 
 @lru_cache

@@ -71,8 +71,10 @@ class SignalMapping:
     def __post_init__(self) -> None:
         """Check the polynomials, and keep them where nobody changes them."""
         for field in fields(self)[:3]:
-            trimmed = poly.polytrim(axis(field.name, getattr(self, field.name)), tol=0.0)
-            object.__setattr__(self, field.name, tuple(float(value) for value in trimmed))
+            values = axis(field.name, getattr(self, field.name)).tolist()
+            while len(values) > 1 and not values[-1]:
+                values.pop()
+            object.__setattr__(self, field.name, tuple(values))
         if not any(self.denominator):
             raise ValueError(f"denominator must not be zero, got {self.denominator}")
 

@@ -692,16 +692,15 @@ class System:
         origin = tuple(self.nominal.get(name) or 0.0 for name in free)
         given = self.given((), {**dict.fromkeys(free, 0.0), **numbers})
         put = {k: Sum.of(polynomial([v])) for k, v in given.items() if k not in free}
-        sums = [part.put(put) for part in (self.numerator, self.denominator)]
-        for _, names in chain(*(part.terms for part in sums)):
+        sums = self.numerator.put(put), self.denominator.put(put)
+        for _, names in [key for part in sums for key in part.terms]:
             if len(names) > 1:
                 raise NotAffineError(
                     f"the system must be affine in {' and '.join(dict.fromkeys(names))} "
                     f"together, but holds {' * '.join(names)}: give a number for one of them, "
                     "or make the product a parameter"
                 )
-        monomials = [(), *((name,) for name in free)]
-        n, m = ([part.before(*names) for names in monomials] for part in sums)
+        n, m = ([part.before(), *map(part.before, free)] for part in sums)
         return Affine(n, m, tuple(free), origin, self.step, self.at_zero)
 
     def functions(
@@ -1013,11 +1012,12 @@ def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
     roots = np.atleast_1d(complex_array(name, values))
     if roots.ndim != 1:
         raise ValueError(f"{name} must be one-dimensional, got shape {roots.shape}")
-    upper = np.sort_complex(roots[roots.imag > 0.0])
-    lower = np.sort_complex(roots[roots.imag < 0.0].conj())
-    if upper.size != lower.size or (np.abs(upper - lower) > 1e-12 * np.abs(lower)).any():
-        raise ValueError(f"{name} must be real or in conjugate pairs, got {values!r}")
-    return tuple(complex(root) for root in roots)
+    if roots.imag.any():
+        upper = np.sort_complex(roots[roots.imag > 0.0])
+        lower = np.sort_complex(roots[roots.imag < 0.0].conj())
+        if upper.size != lower.size or (np.abs(upper - lower) > 1e-12 * np.abs(lower)).any():
+            raise ValueError(f"{name} must be real or in conjugate pairs, got {values!r}")
+    return tuple(roots.tolist())
 
 
 def _by_control(

@@ -46,10 +46,8 @@ def basis(vectors: Iterable[fmpq_poly]) -> list[fmpq_poly]:
     while by_degree:
         top = max(by_degree)
         highest = by_degree.pop(top)
-        pivot = highest[0]
-        for p in highest[1:]:
-            if order(p.coeffs()) > order(pivot.coeffs()):
-                pivot = p
+        orders = [order(p.coeffs()) for p in highest]
+        pivot = highest[orders.index(max(orders))]
         pivot = pivot / pivot[top]
         found.append(pivot)
         for p in highest:
@@ -90,40 +88,35 @@ def functions(
     lags: set[Product] = set()
     rows = []
     for group in groups:
-        # What is left of each sum at s = 0, and what stands before its delays.
-        sums = [(sum(part.values(), fmpq_poly([0])), part) for part in group]
-        chosen = basis(chain(*((whole, *part.values()) for whole, part in sums)))
-        for p in chosen:
-            if p not in union:
-                union.append(p)
+        # What stands before delays, and what is left of each sum at s = 0.
+        wholes = [sum(part.values(), fmpq_poly([0])) for part in group]
+        chosen = basis(chain(wholes, *[part.values() for part in group]))
+        union += [p for p in chosen if p not in union]
         places = [union.index(p) for p in chosen]
-        rows += [(places, chosen, whole, part) for whole, part in sums]
+        rows += [(places, chosen, part) for part in group]
         lags.update(*group)
     space = Space([Polynomial.of(p) for p in union or [fmpq_poly([1])]], lags, step, at_zero)
     column = {lag: k for k, lag in enumerate(space.lags, 1)}
     found = []
-    for places, chosen, whole, part in rows:
+    for places, chosen, part in rows:
         weights = np.full((len(space.polynomials), 1 + len(column)), fmpq(0), object)
-        weights[places, 0] = _weights(chosen, whole)
         for lag, p in part.items():
+            before = _weights(chosen, p)
+            weights[places, 0] += before
             if lag in column:
-                weights[places, column[lag]] = _weights(chosen, p)
+                weights[places, column[lag]] = before
         found.append(Function(space, weights[:, 0], weights[:, 1:]))
     return found
 
 
 def _delays_are_lengths(parts: Sequence[Part]) -> bool:
     """Tell whether equally long delays differ in no way, as none acts on the highest power."""
-    times: dict[fmpq, Product] = {}
-    late, now, unequal = -1, -1, False
-    for part in parts:
-        for lag, p in part.items():
-            unequal |= times.setdefault(lag.time, lag) != lag
-            if lag.time:
-                late = max(late, p.degree())
-            else:
-                now = max(now, p.degree())
-    return unequal and late < now
+    lags = set().union(*parts)
+    if len({lag.time for lag in lags}) == len(lags):
+        return False
+    terms = [(lag.time, p.degree()) for part in parts for lag, p in part.items()]
+    late = max((degree for time, degree in terms if time), default=-1)
+    return late < max((degree for time, degree in terms if not time), default=-1)
 
 
 class Affine:
@@ -156,11 +149,11 @@ class Affine:
         at_zero: int | None,
     ) -> None:
         self.free, self.origin, self.step = free, origin, step
-        groups = []
+        groups, shares = [], [exact(x) for x in (1, *origin)]
         for parts in (n, m):
             # What is left at the nominal values, where a loop is used, is one more sum.
-            shares = zip(parts, map(exact, (1, *origin)), strict=True)
-            there = collected((lag, p * x) for some, x in shares for lag, p in some.items())
+            pairs = zip(parts, shares, strict=True)
+            there = collected([(lag, p * x) for part, x in pairs for lag, p in part.items()])
             groups.append([there, *parts])
         made = functions(groups, step, at_zero)
         (n0, *self.n), (m0, *self.m) = made[: len(made) // 2], made[len(made) // 2 :]
@@ -224,7 +217,7 @@ def present(n: Function, m: Function) -> tuple[Function, Function]:
     """
     space, (one, other) = n.space, ((f.steady != 0) | f.delayed.any(axis=1) for f in (n, m))
     kept = np.flatnonzero(one | other)
-    if not kept.size or max(space.polynomials[j].degree for j in kept) == space.degree:
+    if not kept.size or space.lead[kept].any():
         return n, m
     left = [space.polynomials[j] for j in kept]
     own = Space(left, space.lags, space.step, space.at_zero)

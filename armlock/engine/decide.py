@@ -195,10 +195,10 @@ def count(
         if found >= 0:
             found -= common if right_of < 0.0 else 0
     else:
-        leading = function.leading()
-        if leading is None or leading.order > common:
+        lowest = function.lowest
+        if lowest is None or lowest[0] > common:
             return BOUNDARY if function.confined else UNCONFINED
-        begin = leading if leading.order else None
+        begin = function.leading() if lowest[0] else None
         functions = compiled([function])
         found = int(counts(function.space, functions, leading=[begin], most=most)[0])
     if found == UNDECIDED:

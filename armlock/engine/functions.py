@@ -14,11 +14,12 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import factorial
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from flint import acb, acb_poly, fmpq, fmpq_poly
+from flint import acb, acb_poly, arb, fmpq, fmpq_poly
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray
 from armlock.engine import chain, inclusion
@@ -105,14 +106,15 @@ class Space:
         unit = 1.0 / self.longest if self.longest else 1.0
         whole = next(p for p in self.polynomials if p.degree == self.degree)
         scale = np.array([abs(root) or unit for root in whole.roots])
+        logs = np.log(scale).tolist()
         shape = len(self.polynomials), self.degree
         roots, present = np.zeros(shape, np.complex128), np.zeros(shape, np.bool_)
         computed = np.zeros(shape, np.bool_)
         for j, p in enumerate(self.polynomials):
             left = list(range(self.degree))
             for i, root in sorted(enumerate(p.roots), key=lambda pair: -abs(pair[1])):
-                size = np.log(abs(root) or unit)
-                k = min(left, key=lambda k: abs(np.log(scale[k]) - size))
+                size = math.log(abs(root) or unit)
+                k = min(left, key=lambda k: abs(logs[k] - size))
                 left.remove(k)
                 roots[j, k], present[j, k], computed[j, k] = root, True, i in p.computed
         self.arrays = Arrays(
@@ -370,34 +372,26 @@ class Function:
         weights = [[part[None] for part in f.weights] for f in (self, other) if f]
         return float(self.space.radius(weights, [order], [log(coefficient)], share)[0])
 
-    def value_and_slope(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """F and its derivative at any s, shape (n,), both divided by one number at each s.
+    def with_slope(self) -> tuple[Function, Function]:
+        """Return the function and its derivative, in one space."""
+        own, delays = self.space, np.array(self.space.delays, object)
+        slopes = [p.exact.derivative() for p in own.polynomials]
+        space = Space([*own.polynomials, *map(Polynomial.of, slopes)], own.lags)
+        steady, delayed = self.steady, self.delayed
+        late = -delayed * delays
+        return (
+            Function(space, np.append(steady, 0 * steady), np.vstack((delayed, 0 * delayed))),
+            Function(space, np.append(late.sum(1), steady), np.vstack((late, delayed))),
+        )
 
-        The number keeps a product of many factors from overflowing. It does not change the
-        quotient of the two, which is a step of Newton's method.
-        """
-        arrays, (steady, delayed) = self.space.arrays, self.weights
-        value, slope = np.zeros_like(s), np.zeros_like(s)
-        by = 1.0 / (np.abs(s)[:, None] + arrays.scale)
-        delays = arrays.delays
-        turn = np.expm1(-np.multiply.outer(s, delays))
-        for j, lead in enumerate(arrays.lead):
-            p, dp = np.full(s.shape, complex(lead)), np.zeros_like(s)
-            for k, present in enumerate(arrays.present[j]):
-                if present:
-                    w = (s - arrays.roots[j, k]) * by[:, k]
-                    p, dp = p * w, dp * w + p * by[:, k]
-                else:
-                    p, dp = p * by[:, k], dp * by[:, k]
-            g = steady[j] + turn @ delayed[j]
-            value += p * g
-            slope += dp * g - p * ((1.0 + turn) @ (delays * delayed[j]))
-        return value, slope
-
-    def in_ball(self, s: acb) -> acb:
-        """Evaluate at a ball of python-flint, with the bits of python-flint's context."""
-        terms = (acb_poly(p)(s) * (-s * theta).exp() for theta, p in self.by_delay)
-        return sum(terms, acb(0))
+    def taylor(self, s: acb, number: int) -> list[acb]:
+        """First Taylor coefficients at a ball, with the bits of python-flint's context."""
+        found = acb_poly([0])
+        for theta, p in self.by_delay:
+            late, turn = arb(-theta), (-s * theta).exp()
+            turns = acb_poly([turn * late**k / factorial(k) for k in range(number)])
+            found += acb_poly(p)(acb_poly([s, 1])) * turns
+        return [found[k] for k in range(number)]
 
     def shifted(self, sigma: float) -> tuple[Space, inclusion.Functions]:
         """Return the function s -> F(s + sigma): its space, and its weights.

@@ -57,12 +57,12 @@ class Polynomial:
             return cls(p, ())
         left, known, computed = p / p.leading_coefficient(), [], []
         for root, number in _roots(left):
-            factor = _factor(root) ** number
+            rest, missed = divmod(left, _factor(root) ** number)
             pair = [root, root.conjugate()] if root.imag else [root]
-            if left % factor:
+            if missed:
                 computed += pair * number
             else:
-                left //= factor
+                left = rest
                 known += pair * number
         places = range(len(known), len(known) + len(computed))
         # Each of them is rounded by half an EPSILON.
@@ -137,7 +137,7 @@ def of_roots(roots: Iterable[complex]) -> fmpq_poly:
 def _factor(root: complex) -> Any:
     """Return s - root, or for a complex root the product with its conjugate."""
     a, b = exact(root.real), exact(root.imag)
-    return polynomial([a * a + b * b, -2 * a, 1] if b else [-a, 1])
+    return fmpq_poly([a * a + b * b, -2 * a, 1] if b else [-a, 1])
 
 
 def enclosed_roots(p: fmpq_poly) -> Any:

@@ -10,8 +10,10 @@ many bits as it takes.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import reduce
 from itertools import zip_longest
 from operator import and_
@@ -22,7 +24,7 @@ import numpy as np
 from flint import acb, fmpq
 
 from armlock.checks import ComplexArray, FloatArray
-from armlock.engine.functions import Function, Space, limit_at_zero
+from armlock.engine.functions import Exact, Function, Space, limit_at_zero
 from armlock.engine.polynomials import rounded
 from armlock.engine.tolerances import EPSILON
 
@@ -34,7 +36,7 @@ _MAY_LOSE, _FEWEST_BITS, _MOST_BITS, _ENOUGH_BITS = 2.0**11, 128, 1 << 14, 60
 # Factor that splits a number in two halves.
 _SPLIT = 2.0**27 + 1.0
 # Rounding errors of a sum, over the size of its terms.
-_ROUNDING = 4.0 * EPSILON
+ROUNDING = 4.0 * EPSILON
 
 
 class Quotient:
@@ -51,13 +53,16 @@ class Quotient:
         sizes = [abs(x) for f in m for x in (*f.steady, *f.delayed.ravel())]
         scale = max(sizes, default=fmpq(0)) or fmpq(1)
         space = n[0].space
-        self.delays, self.tails = space.arrays.delays[:, None], space.arrays.tails[:, None]
+        self.delays, self.tails = (
+            x.tolist() for x in (space.arrays.delays, space.arrays.tails)
+        )
         self.above, self.below = _Sum(n, scale), _Sum(m, scale) if m else None
         over = self.below.common if self.below else Counter()
         # Factors that N and M share are left out.
         zeros, poles = self.above.common - over, over - self.above.common
         self.factors = _Factors(zeros, poles, space)
 
+    @np.errstate(all="ignore")
     def at(
         self,
         s: ComplexArray,
@@ -82,36 +87,39 @@ class Quotient:
         errors : float array, shape (size,)
             Of the values.
         """
-        found, errors = np.empty(s.shape, np.complex128), np.empty(s.shape)
-        # Far on the right exp(-s theta) is small: it is summed itself, and not less one.
-        far = s.real * self.delays[:1].sum() > 1.0
-        for part in (far, ~far):
-            places = np.flatnonzero(part)
-            for first in range(0, places.size, _BLOCK):
-                k = places[first : first + _BLOCK]
+        found, off = np.empty(s.shape, np.complex128), np.full(s.shape, np.nan)
+        if s.size == 1:
+            # Python's own numbers are much faster than arrays; they raise at a pole.
+            xs = [x.item() if isinstance(x, np.ndarray) else x for x in numbers]
+            with suppress(ArithmeticError):
+                found[0], off[0] = self.roughly(s.item(), xs)
+        else:
+            for first in range(0, s.size, _BLOCK):
+                k = slice(first, first + _BLOCK)
                 xs = [x[k] if isinstance(x, np.ndarray) else x for x in numbers]
-                found[k], errors[k] = self._some(s[k], xs, part is far)
+                found[k], off[k] = self.roughly(s[k], xs)
         if self.below:
-            errors[s == 0.0] = np.nan
-        for i in np.flatnonzero(np.isnan(errors)):
+            off[s == 0.0] = np.nan
+        errors = ROUNDING * off * np.abs(found)
+        for i in np.flatnonzero(~(np.isfinite(found) & (off <= _MAY_LOSE))):
             found[i] = _in_balls(complex(s[i]), *exactly(int(i)), bool(self.below))
             errors[i] = EPSILON * abs(found[i])
         return found, errors
 
-    @np.errstate(all="ignore")
-    def _some(
-        self, s: ComplexArray, numbers: Sequence[Any], far: bool
-    ) -> tuple[ComplexArray, FloatArray]:
-        """Return some values, and their errors: nan where balls are needed."""
-        turns = turned(s, self.delays, self.tails, far)
-        sizes = np.abs(turns)
-        top, off = self.above.at(s, numbers, turns, sizes, far)
+    def roughly(self, s: Any, numbers: Sequence[Any]) -> tuple[Any, Any]:
+        """Return values, and how many times their size rounding errors are, in `ROUNDING`.
+
+        Of one complex number with numbers, or of an array.
+        """
+        turns = [turned(s, *delay) for delay in zip(self.delays, self.tails, strict=True)]
+        sizes = [abs(turn) for turn in turns]
+        top, off = self.above.at(s, numbers, turns, sizes)
         front, more = self.factors.at(s)
         value, off = front * top, off + more
         if self.below:
-            bottom, more = self.below.at(s, numbers, turns, sizes, far)
+            bottom, more = self.below.at(s, numbers, turns, sizes)
             value, off = value / bottom, off + more
-        return value, np.where(off <= _MAY_LOSE, _ROUNDING * off * np.abs(value), np.nan)
+        return value, off
 
 
 class _Factors:
@@ -130,7 +138,7 @@ class _Factors:
         ]
         self.number = (zeros + poles).total()
 
-    def at(self, s: ComplexArray) -> tuple[Any, Any]:
+    def at(self, s: Any) -> tuple[Any, Any]:
         """Return the product at some s, and what rounding makes of it, in its own size."""
         found: Any = 1.0
         # In turn, so that the product neither overflows nor underflows on the way.
@@ -141,7 +149,7 @@ class _Factors:
                 found = found / (s - pole)
         off: Any = self.number
         for root in self.rounded:
-            off = off + abs(root) / np.abs(s - root)
+            off = off + abs(root) / abs(s - root)
         return found, off
 
 
@@ -163,44 +171,53 @@ class _Sum:
             (
                 float(space.polynomials[j].lead),
                 _Factors(own - self.common, Counter(), space),
-                [
-                    (i, *rounded([s, s - w.sum()]).tolist(),
-                     [(k, x) for k, x in enumerate(rounded(w).tolist()) if x])
-                    for i, (s, w) in enumerate(acting[j]) if s or w.any()
-                ],
+                [_row(i, *row) for i, row in enumerate(acting[j]) if row[0] or row[1].any()],
             )
             for j, own in zip(places, roots, strict=True)
-        ]  # fmt: skip
+        ]
 
     def at(
-        self,
-        s: ComplexArray,
-        numbers: Sequence[Any],
-        turns: ComplexArray,
-        sizes: FloatArray,
-        far: bool,
+        self, s: Any, numbers: Sequence[Any], turns: Sequence[Any], sizes: Sequence[Any]
     ) -> tuple[Any, Any]:
         """Return the sum without its common factors, and the size of its terms over it."""
         value, size = 0.0, 0.0
         for lead, factors, rows in self.terms:
             total, most = 0.0, 0.0
-            for i, steady, still, late in rows:
+            for i, steady, late in rows:
                 x = numbers[i]
                 if isinstance(x, float) and not x:
                     continue
-                here, largest = still if far else steady, abs(still if far else steady)
+                here, largest = steady, abs(steady)
                 for k, weight in late:
                     here = here + weight * turns[k]
                     largest = largest + abs(weight) * sizes[k]
-                total, most = total + x * here, most + np.abs(x) * largest
+                total, most = total + x * here, most + abs(x) * largest
             p, off = factors.at(s)
             p = lead * p
-            value, size = value + p * total, size + np.abs(p) * (1.0 + off) * most
-        return value, size / np.abs(value)
+            value, size = value + p * total, size + abs(p) * (1.0 + off) * most
+        return value, size / abs(value)
 
 
-def turned(s: ComplexArray, theta: Any, tail: Any, far: bool) -> ComplexArray:
-    """Return exp(-s theta), less one unless far, with the digits that s * theta is short of.
+def _row(i: int, s: fmpq, w: Exact) -> tuple[int, float, list[tuple[int, float]]]:
+    """Return the weights of one function at one polynomial, rounded; of W what is not zero."""
+    steady, *late = rounded((s, *w)).tolist()
+    return i, steady, [(k, x) for k, x in enumerate(late) if x]
+
+
+def newton(function: Function) -> Quotient:
+    """Return F / F', the step of Newton's method."""
+    return Quotient(*([f] for f in function.with_slope()))
+
+
+def turned(s: Any, theta: float, tail: float) -> Any:
+    """Return exp(-s theta) - 1 of a number or an array."""
+    product, rest = times(s, theta, tail)
+    turn = np.expm1(-product) if isinstance(product, np.ndarray) else _expm1(-product)
+    return turn - rest * (1.0 + turn)
+
+
+def times(s: Any, theta: float, tail: float) -> tuple[Any, Any]:
+    """Return s * theta, and what it is short of, of a delay and what that is short of.
 
     Many turns of a delay are rounded by more than the exponential is: Dekker's product.
     """
@@ -209,10 +226,14 @@ def turned(s: ComplexArray, theta: Any, tail: Any, far: bool) -> ComplexArray:
     s_high = _SPLIT * s - (_SPLIT * s - s)
     low, s_low = theta - high, s - s_high
     rest = ((high * s_high - product) + high * s_low + low * s_high) + low * s_low
-    rest += tail * s
-    turn: ComplexArray = np.exp(-product) if far else np.expm1(-product)
-    turn -= rest * (turn if far else 1.0 + turn)
-    return turn
+    return product, rest + tail * s
+
+
+def _expm1(z: complex) -> complex:
+    """Return exp(z) - 1, as numpy does."""
+    half = math.sin(0.5 * z.imag)
+    real = math.expm1(z.real) * math.cos(z.imag) - 2.0 * half * half
+    return complex(real, math.exp(z.real) * math.sin(z.imag))
 
 
 def _in_balls(s: complex, n: Function, m: Function, divided: bool) -> complex:
@@ -222,7 +243,7 @@ def _in_balls(s: complex, n: Function, m: Function, divided: bool) -> complex:
     bits, at = _FEWEST_BITS, acb(s.real, s.imag)
     while True:
         with flint.ctx.workprec(bits):
-            above, below = n.in_ball(at), m.in_ball(at) if divided else acb(1)
+            above, below = n.taylor(at, 1)[0], m.taylor(at, 1)[0] if divided else acb(1)
             found = above / below
         if above == 0 or found.rel_accuracy_bits() > _ENOUGH_BITS:
             return complex(found)

@@ -10,19 +10,19 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import factorial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import flint
 import numpy as np
 import numpy.typing as npt
-from flint import acb, acb_poly, arb, fmpq_poly
+from flint import acb, arb, fmpq_poly
 
 from armlock.checks import ComplexArray, FloatArray, real_number, whole_steps
 from armlock.engine import chain, decide, inclusion
 from armlock.engine.functions import Function, Space, common_zeros
 from armlock.engine.polynomials import enclosed_roots
 from armlock.engine.tolerances import BOUNDARY, UNCONFINED, UndecidedError
+from armlock.engine.values import ROUNDING, newton
 from armlock.stability.counts import CountError, at_points, count_exactly, decided, place
 from armlock.systems import System
 from armlock.tables import Shown, Table
@@ -111,10 +111,10 @@ class _Disc(NamedTuple):
 
 
 class _Balls:
-    """F(s) / s^common in balls, as polynomials times exponentials."""
+    """F(s) / s^common in balls."""
 
     def __init__(self, function: Function, common: int) -> None:
-        self.parts, self.common = function.by_delay, common
+        self.function, self.common = function, common
         self.unit = 1.0 / function.space.longest
 
     def series(self, s: acb, number: int) -> list[acb]:
@@ -123,13 +123,7 @@ class _Balls:
         Those of a ball bound what is left of the series, times a power of the radius.
         """
         at_zero = self.common if s.contains(0) else 0
-        size, total = number + at_zero, acb_poly([0])
-        for theta, p in self.parts:
-            late, value = arb(-theta), (-s * theta).exp()
-            turn = acb_poly([value * late**k / factorial(k) for k in range(size)])
-            total += acb_poly(p)(acb_poly([s, 1])) * turn
-        found = [total[k] for k in range(size)]
-        found = found[at_zero:]
+        found = self.function.taylor(s, number + at_zero)[at_zero:]
         for _ in range(self.common - at_zero):
             # Over s + x, one coefficient after the other.
             for k in range(number):
@@ -204,7 +198,7 @@ class _Search:
         #: How many roots at s = 0 there are; these are known exactly.
         self.at_zero = (function.lowest or (common,))[0] - common
         self.common = common + self.at_zero
-        self.balls = _Balls(function, self.common)
+        self.balls, self.newton = _Balls(function, self.common), newton(function)
         self.unit, self.further = self.balls.unit, _TURNS_FURTHER
         own = function.space.arrays
         self.poles = np.unique(own.roots[own.present])
@@ -262,10 +256,12 @@ class _Search:
         divided = np.array([*known, *[0.0] * self.common], np.complex128)
         length = np.full(s.shape, np.inf)
         for _ in range(_STEPS):
-            value, slope = self.function.value_and_slope(s)
+            step, off = self.newton.roughly(s, (1.0,))
             away = (1.0 / np.subtract.outer(s, divided)).sum(axis=1)
-            move = np.where(value == 0.0, 0.0, 1.0 / (slope / value - away))
-            s, length = s - move, np.abs(move)
+            move = np.where(step == 0.0, 0.0, 1.0 / (1.0 / step - away))
+            # Where F is rounding errors, so is the step.
+            rounding = np.where(step == 0.0, 0.0, ROUNDING * off * np.abs(step))
+            s, length = s - move, np.abs(move) + rounding
         # Slow roots are far smaller than a turn.
         turn = 2.0 * np.pi * self.unit
         found = s[length <= np.minimum(1e-5 * turn, 1e-3 * np.abs(s) + _SLOWEST * turn)]

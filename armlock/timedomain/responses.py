@@ -24,7 +24,7 @@ from armlock.engine.decide import count
 from armlock.engine.functions import common_zeros
 from armlock.engine.polynomials import collected, enclosed_roots, exact, polynomial
 from armlock.engine.tolerances import EPSILON
-from armlock.engine.values import turned
+from armlock.engine.values import times
 from armlock.stability.counts import decided, require_stable
 from armlock.systems import Delay, Lag, Sum, System
 from armlock.systems import s as laplace
@@ -427,10 +427,10 @@ def _parts(
     n: list[_Jumps], m: list[_Jumps], corner: float, s: ComplexArray
 ) -> list[ComplexArray]:
     """Evaluate impulses, jumps and kinks: the powers of 1 / (s + corner) of N / M."""
-    turns = {
-        theta: turned(s, float(theta), float(theta - exact(float(theta))), far=True)
-        for theta in set().union(*n, *m)
-    }
+    turns = {}
+    for theta in set().union(*n, *m):
+        product, rest = times(s, float(theta), float(theta - exact(float(theta))))
+        turns[theta] = np.exp(-product) * (1.0 - rest)
 
     def at(part: _Jumps) -> ComplexArray:
         total = np.zeros_like(s)
