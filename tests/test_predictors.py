@@ -58,18 +58,11 @@ def drawn(seed):
 
 
 @pytest.mark.parametrize("seed", range(draws(3, 24)))
-def test_smith_predictors_have_margins_where_all_small_delays_are_tolerated(seed):
+def test_smith_predictors_have_their_margins_by_the_identity_of_their_delay(seed):
     pi, plant, theta, direct = drawn(seed)
     process, controller, z = control.tf(*plant), control.tf(*pi), delay(theta)
     loop = predictor(controller, process, z, z)
     assert unstable_roots(loop) == 0
-    # Two delays that are equal by chance are two delays.
-    two = predictor(controller, process, z, delay(theta))
-    assert unstable_roots(two) == (UNCONFINED if direct >= 1.0 else 0)
-    if direct >= 1.0:
-        with pytest.raises(CountError, match="the turn at high frequency is not found"):
-            margins(loop)
-        return
     found = margins(loop)
     upper, lower, phase, late, modulus = by_turns(pi, plant, theta)
     # At high frequency, L = k z / (1 + k - k z) with k = K P at infinity.
@@ -77,17 +70,62 @@ def test_smith_predictors_have_margins_where_all_small_delays_are_tolerated(seed
     assert found.gain_upper == pytest.approx(min(upper, 2.0 + 1.0 / direct), rel=1e-6)
     assert found.phase == pytest.approx(phase, rel=2e-6)
     assert found.modulus == pytest.approx(modulus, rel=2e-6)
-    assert found.delay == pytest.approx(late, rel=2e-6)
+    assert found.delay == pytest.approx(late if direct < 1.0 else 0.0, rel=2e-6)
+    # Two delays that are equal by chance are two delays.
+    two = predictor(controller, process, z, delay(theta))
+    assert unstable_roots(two) == (UNCONFINED if direct >= 1.0 else 0)
 
 
-@pytest.mark.parametrize("k", [0.3, 0.9])
+@pytest.mark.parametrize("k", [0.3, 0.9, 1.01, 1.5, 2.0, 5.0])
 def test_without_dynamics_all_margins_are_those_of_a_circle(k):
-    # L = k z / (1 + k - k z) is smaller than one for all z.
+    # L = k z / (1 + k - k z) has the magnitude one where k sin(psi / 2) = (1 + k) / 2.
     z = delay(1.3)
     found = margins(predictor(k, System.of(1), z, z))
     assert found.gain_upper == pytest.approx(2.0 + 1.0 / k, rel=1e-9)
     assert found.modulus == pytest.approx((1.0 + k) / (1.0 + 2.0 * k), rel=1e-9)
-    assert (found.phase, found.delay) == (math.inf, math.inf)
+    if k < 1.0:
+        assert (found.phase, found.delay) == (math.inf, math.inf)
+    else:
+        assert found.phase == pytest.approx(2.0 * math.asin((1.0 + k) / (2.0 * k)), rel=1e-6)
+        assert (found.delay, found.phase_omega) == (0.0, math.inf)
+
+
+@pytest.mark.parametrize("k", [0.9, 1.1, 3.0])
+@pytest.mark.parametrize("q", [7, 40])
+def test_a_delay_margin_of_zero_is_a_chain_that_any_delay_sets_free(k, q):
+    """With x = exp(-s theta / q), and a further delay theta / q, the chain is a polynomial."""
+    chain = np.zeros(q + 2)
+    chain[0], chain[q], chain[q + 1] = 1.0 + k, -k, k
+    largest = 1.0 / np.abs(np.roots(chain[::-1])).min()
+    theta = 2.0
+    z, plant = delay(theta), (s + 3) / (s + 2)
+    loop = predictor(k * (1 + 1 / s), plant, z, z)
+    assert (largest > 1.0) == (margins(loop).delay == 0.0)
+    counted = unstable_roots(loop * delay(theta / q))
+    assert (counted == UNCONFINED) == (largest > 1.0)
+
+
+def test_two_delays_in_the_plant_turn_independently():
+    # With u = z + 0.3 w, L = 2 u / (3.6 - 2 u), of magnitude one where Re u = 0.9.
+    z, w = delay(1.0), delay(0.7)
+    plant = z + 0.3 * w
+    found = margins(2 / (1 + 2 * (1.3 - plant)) * plant)
+    assert found.phase == pytest.approx(math.pi - 2.0 * math.acos(0.9 / 1.3), rel=1e-6)
+    assert (found.delay, found.phase_omega) == (0.0, math.inf)
+    assert found.modulus == pytest.approx(3.6 / 6.2, rel=1e-9)
+
+
+def test_powers_of_one_delay_do_not_turn_independently():
+    # With u = z - z^2 + z^3, of which Re u is 1.32 at most, L = u / (d - u).
+    z, x = delay(1.0), np.exp(1j * np.linspace(0.0, np.pi, 2_000_001))
+    late, u = z - z**2 + z**3, x - x**2 + x**3
+    for d in (2.7, 1.8):
+        found, level = margins(late / (d - late)), u / (d - u)
+        crossings = np.flatnonzero(np.diff(np.abs(level) < 1.0))
+        least = np.abs(np.angle(-level[crossings])).min(initial=np.inf)
+        assert found.phase == pytest.approx(least, abs=1e-5)
+        assert found.delay == (0.0 if crossings.size else math.inf)
+        assert found.modulus == pytest.approx(np.abs(1 + level).min(), rel=1e-6)
 
 
 def test_a_chart_of_a_predictor_with_two_delays_ends_where_its_chain_does():

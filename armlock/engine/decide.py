@@ -333,7 +333,7 @@ class Family:
         steady, delayed = stacked(self.functions[:1])
         limits = np.column_stack(self.space.limits(*stacked(self.functions[:2])))
         loose = sum(f.size_at_infinity for f in self.functions[2:])
-        reserve = chain.arc_reserve(limits[1], limits[0], angle, loose)
+        reserve = chain.arc_reserve(self.space.lags, limits[1], limits[0], angle, loose)
         more = sum((f.sizes for f in others), np.zeros(steady.shape[1]))
         return float(
             self.space.confined_from(steady, delayed, extra=more, reserve=reserve).max()

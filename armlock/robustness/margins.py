@@ -493,7 +493,7 @@ def _limit_of_ratio(d: Function, n: Function) -> tuple[float, float, float]:
     lags, turned = [space.lags[k] for k in acting], turned[:, acting]
     objects = sorted({one for lag in lags for one, _ in lag}, key=lambda one: one.mark)
     # Of shared objects the sum of magnitudes is no limit.
-    shared = chain.share_objects(lag for lag, c in zip(lags, turned[0], strict=True) if c)
+    shared = bool(chain.own_phases(lag for lag, c in zip(lags, turned[0], strict=True) if c)[1])
     if left <= 0.0 and shared:
         return math.inf, math.nan, 0.0
     if not turned[1].any() and not shared:
@@ -617,10 +617,10 @@ def _crossover(
     return _over_axis(family, n, m, free, goal, best, where)
 
 
-def _turn_at_infinity(n: Function, m: Function, free: Free | None) -> float:
+def _turn_at_infinity(n: Function, m: Function, free: Free | None) -> tuple[float, bool]:
     """Smallest abs(arg(-L)) where abs(L) is one at infinite frequency; inf where it never is.
 
-    Over all phases of the delay objects there (Lemma 24).
+    Over all phases of the delay objects there (Lemma 24); and whether it is no lower bound.
     """
     arms: tuple[Function, ...] = ()
     if free:
@@ -630,10 +630,15 @@ def _turn_at_infinity(n: Function, m: Function, free: Free | None) -> float:
     return chain.arc_limit(n.space.lags, of_n, of_m, loose)
 
 
-def _phase(n: Function, m: Function, free: Free | None, turn: float) -> tuple[float, float]:
+def _phase(
+    n: Function, m: Function, free: Free | None, turn: float, is_found: bool
+) -> tuple[float, float]:
     """Smallest |arg(-L)| where |L| = 1, and where; `turn` is the one at infinity."""
     best, where = (turn, math.inf) if turn < math.inf else (math.pi, math.nan)
-    return _crossover(n, m, free, PHASE, (-1.0, 0.0, 1.0, 0.0), best, where)
+    best, where = _crossover(n, m, free, PHASE, (-1.0, 0.0, 1.0, 0.0), best, where)
+    if where == math.inf and not is_found:
+        raise UndecidedError(f"the turn at high frequency is not found, from {turn:.6g} rad on")
+    return best, where
 
 
 def _delay(n: Function, m: Function, free: Free | None, turn: float) -> tuple[float, float]:
@@ -742,7 +747,7 @@ def _gain_limit(f: Function, g: Function, end: Callable[[float], float]) -> Gain
 def _shares_objects(f: Function, g: Function) -> bool:
     """Tell whether the sum of magnitudes asks for more than f + t g needs at high frequency."""
     pairs = zip(f.space.lags, f.limits[1:], g.limits[1:], strict=True)
-    return chain.share_objects(lag for lag, a, b in pairs if a or b)
+    return bool(chain.own_phases(lag for lag, a, b in pairs if a or b)[1])
 
 
 def gain_limits(n: Function, m: Function) -> tuple[GainLimit, GainLimit]:
@@ -772,8 +777,8 @@ def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
     """
     require_stable(n + m, common_zeros(n, m))
     below, above = [GainLimit(math.nan)] * 2 if free else gain_limits(n, m)
-    turn = _turn_at_infinity(n, m, free)
-    phase, phase_omega = _phase(n, m, free, turn)
+    turn, is_found = _turn_at_infinity(n, m, free)
+    phase, phase_omega = _phase(n, m, free, turn, is_found)
     delay, _ = _delay(n, m, free, turn)
     modulus, modulus_omega = modulus_of(n, m, free)
     return Margins(

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 # Where |L| is below it no crossing of the negative real axis is of interest, and above the
 # other one a pole is on the axis.
 _SMALL, _LARGE = 1e-3, 1e12
+# More crossings than this are not looked for: each takes a step or more.
+_MOST_CROSSINGS = 1e7
 # To this share L has to agree at both ends of the interval that holds a crossing.
 _AGREED = 1e-3
 # Crossings that a table shows.
@@ -370,6 +372,12 @@ def axis_crossings(
         raise CountError(f"no crossings{place(point)}: L is real near s = 0", point[None])
     if begin >= omega_max:
         return AxisCrossings(np.empty(0), np.empty(0))
+    about = _crossings_expected(n, m, np.geomspace(begin, omega_max, 200), least)
+    if about > _MOST_CROSSINGS:
+        raise CountError(
+            f"no crossings{place(point)}: there are about {about:.0e} up to {omega_max:.3g} "
+            "rad/s, give a lower omega_max", point[None],
+        )  # fmt: skip
     found = crossings(
         (n, n * 0, m), np.zeros(1), np.array([-_LARGE]), np.array([-least]),
         np.array([omega_max]), begin=begin,
@@ -388,6 +396,14 @@ def axis_crossings(
     kept = agreed & (value < -least) & (value > -_LARGE)
     order = np.argsort(found.omega[kept])
     return AxisCrossings(found.omega[kept][order], value[kept][order])
+
+
+def _crossings_expected(n: Function, m: Function, omega: FloatArray, least: float) -> float:
+    """About how many crossings there are, from one turn of the longest delay at frequencies."""
+    turn = 2.0 * np.pi / n.space.longest if n.space.longest else 0.0
+    value = _response(n, m, np.add.outer(omega, np.linspace(0.0, turn, 33)))
+    crossed = np.diff(value.imag < 0.0, axis=1) & (value.real[:, 1:] < -least)
+    return float(np.trapezoid(crossed.sum(axis=1), omega) / turn) if turn else 0.0
 
 
 def _agree(n: Function, m: Function, omega: FloatArray, value: FloatArray) -> BoolArray:
