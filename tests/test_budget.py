@@ -73,15 +73,16 @@ def test_the_budget_is_held_against_a_requirement_and_draws_itself():
     plt.close()
 
 
-def test_the_budget_takes_another_laser_and_names_its_own():
+def test_the_budget_takes_other_levels_and_names_its_own():
     f = np.geomspace(1e-3, 1.0, 20)
     usual = noise_budget(FLIGHT, f)
     assert usual.free == pytest.approx(3e4 / f, rel=1e-12)
     assert "30 kHz/sqrt(Hz) at 1 Hz" in (noise_budget.__doc__ or "")
     laser = LaserNoise(1, 200.0)
-    other = noise_budget(FLIGHT, f, laser=laser.asd)
-    share = laser.asd(f) * f / 3e4
-    assert other.sources["laser"] == pytest.approx(share * usual.sources["laser"], rel=1e-12)
+    other = noise_budget(FLIGHT, f, laser=laser.asd, shot=3e-5, clock=1.2e-12)
+    shares: dict[str, Any] = {"laser": laser.asd(f) * f / 3e4, "shot": 3.0, "clock": 0.5}
+    for name, share in shares.items():
+        assert other.sources[name] == pytest.approx(share * usual.sources[name], rel=1e-12)
     assert np.array_equal(other.sources["motion"], usual.sources["motion"])
     wrong: list[Any] = [lambda _: 1.0, lambda x: np.nan * x]
     for one in wrong:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import FloatArray, axis, finite_series, positive_array
+from armlock.checks import FloatArray, axis, finite_series, not_negative, positive_array
 from armlock.loops import Loop
 from armlock.performance.transfer import require_stable_loop, transfer
 from armlock.tables import Shown, Table, number
@@ -156,6 +156,8 @@ def noise_budget(
     frequency: npt.ArrayLike,
     *,
     laser: Callable[[FloatArray], FloatArray] = free_running,
+    shot: float = LEVELS.shot,
+    clock: float = LEVELS.clock,
 ) -> NoiseBudget:
     r"""Compute what noise is left on the locked laser, at c1 = c2 = 1.
 
@@ -188,7 +190,12 @@ def noise_budget(
         Noise of the free laser in Hz/sqrt(Hz) as a function of the frequency in Hz, for
         instance the method ``asd`` of a `LaserNoise`. By default 30 kHz/sqrt(Hz) at 1 Hz,
         falling as 1/f. A measured table makes such a function:
-        ``lambda f: numpy.interp(f, frequencies, densities)``. The other levels are `Levels`.
+        ``lambda f: numpy.interp(f, frequencies, densities)``.
+    shot : float, optional
+        Shot noise of one link in cycles/sqrt(Hz), 1e-5 by default.
+    clock : float, optional
+        Fractional frequency noise of a clock at 1 Hz in 1/sqrt(Hz), 2.4e-12 by default. It
+        falls as 1/sqrt(f).
 
     Returns
     -------
@@ -200,7 +207,8 @@ def noise_budget(
     ------
     TypeError, ValueError
         If `loop` is no `Loop` or not stable, the frequencies are not positive and
-        one-dimensional, or `laser` does not return a density for each.
+        one-dimensional, `laser` does not return a density for each, or another level is
+        negative.
 
     References
     ----------
@@ -225,6 +233,7 @@ def noise_budget(
     """
     f = axis("frequency", positive_array("frequency", frequency))
     free = finite_series("laser(frequency)", laser(f))
+    shot, clock = not_negative("shot", shot), not_negative("clock", clock)
     require_stable_loop(loop)
     s = 2j * np.pi * f
     arms = np.array([transfer(loop, "arm 1", s), transfer(loop, "arm 2", s)])
@@ -239,8 +248,8 @@ def noise_budget(
 
     locked = {
         "laser": np.abs(transfer(loop, "laser", s)) * free,
-        "shot": np.sqrt(2.0) * LEVELS.shot * np.abs(s) * through(0.0, 1.0),
-        "clock": LEVELS.clock / np.sqrt(f) * through(beats, beats),
+        "shot": np.sqrt(2.0) * shot * np.abs(s) * through(0.0, 1.0),
+        "clock": clock / np.sqrt(f) * through(beats, beats),
         "motion": motion * through(1.0 + np.exp(-s * tau), 2.0),
     }
     return NoiseBudget(f, locked, tdi_capability(f), free)
