@@ -13,6 +13,7 @@ any other `armlock.systems.System`. The Hayes equation has no sensor: it is an e
 from __future__ import annotations
 
 from functools import cached_property
+from numbers import Real
 from typing import Any, Self
 
 import numpy as np
@@ -301,6 +302,16 @@ def _mapping_and_delays(
     return mapping, tau1, tau2
 
 
+def _gain(gain: object, sensor: str) -> float:
+    """Return a positive gain, or say what to write with a controller in its place."""
+    if isinstance(gain, Real):
+        return positive_number("gain", gain)
+    raise TypeError(
+        f"gain must be a real number, got {gain!r:.200}; with a controller of your own write "
+        f'Loop(controller, "{sensor}", ...)'
+    )
+
+
 _SAMPLED = (
     "a simulation samples the factors of its controller, and noise and Doppler errors are "
     "those of its two arms; counts, charts, margins and step responses take any other system, "
@@ -352,7 +363,7 @@ def SingleArm(
     >>> unstable_roots(SingleArm(gain=1.0, tau1=20.1), [0.99, 1.0, 1.01], 0.0)
     array([0, 0, 1])
     """
-    return Loop(integrating_actuator(gain), SINGLE, tau1)
+    return Loop(integrating_actuator(_gain(gain, "single")), SINGLE, tau1)
 
 
 def CommonArm(
@@ -390,7 +401,7 @@ def CommonArm(
     >>> unstable_roots(CommonArm(gain=10.0), 1.0, 0.999)
     0
     """
-    return Loop(integrating_actuator(gain), COMMON, tau1, tau2)
+    return Loop(integrating_actuator(_gain(gain, "common")), COMMON, tau1, tau2)
 
 
 def DualArm(
@@ -449,7 +460,7 @@ def DualArm(
     array([1, 0, 0])
     """
     mapping = sensors.dual(corner, tau1 - tau2 if difference is None else difference)
-    return Loop(integrating_actuator(gain), mapping, tau1, tau2)
+    return Loop(integrating_actuator(_gain(gain, "dual")), mapping, tau1, tau2)
 
 
 def paper_loop(

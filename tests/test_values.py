@@ -64,3 +64,14 @@ def test_products_of_parameters_are_put_in_first():
     expected = x * y * np.exp(-0.3 * z) / (z + x)
     assert system(z, x, y) == pytest.approx(expected, rel=1e-14)
     assert system(z[0], 1.0, 0.5) == pytest.approx(expected[0], rel=1e-14)
+
+
+@pytest.mark.parametrize("loop", LOOPS, ids=range(5))
+def test_a_step_of_newtons_method_is_the_function_over_its_derivative(loop):
+    n, m = loop.functions((1.0, 0.9))
+    step = values.newton(n + m)
+    z = np.array([0.01 + 0.3j, -0.02 + 2e-3j])
+    for at, found in zip(z.tolist(), step.roughly(z, (1.0,))[0], strict=True):
+        value, slope = (n + m).taylor(acb(at.real, at.imag), 2)
+        assert found == pytest.approx(complex(value / slope), rel=1e-9)
+        assert step.roughly(at, (1.0,))[0] == pytest.approx(found, rel=1e-12)
