@@ -52,6 +52,7 @@ CONFINED_IN_A_MARGIN = 256.0 * EPSILON
 #: What such a margin leaves undecided next to the limit of the chain, as a share of that limit,
 #: is the limit.
 NEXT_TO_THE_LIMIT = 1e-6
+# How finely the turn of L at high frequency is searched stands in `chain.py`, with the search.
 
 # ------------------------------------------------------------------------ -3: too many steps
 
