@@ -180,7 +180,9 @@ class _Sum:
         self, s: Any, numbers: Sequence[Any], turns: Sequence[Any], sizes: Sequence[Any]
     ) -> tuple[Any, Any]:
         """Return the sum without its common factors, and the size of its terms over it."""
-        value, size = 0.0, 0.0
+        if not self.terms:
+            return 0.0 * s, 0.0
+        value, size = 0.0 * s, 0.0
         for lead, factors, rows in self.terms:
             total, most = 0.0, 0.0
             for i, steady, late in rows:

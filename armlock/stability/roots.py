@@ -228,7 +228,9 @@ class _Search:
     def candidates(self, sigma: float, most: int = _MOST_STARTS) -> ComplexArray:
         """Return where Newton's method leads from a line, the rightmost first."""
         space, functions = self.function.shifted(sigma)
-        turn = 2.0 * np.pi * self.unit
+        # Far to the right the longer delays no longer act.
+        acting = space.arrays.delays[functions.delayed[0].any(axis=0)].max(initial=0.0)
+        turn = 2.0 * np.pi / (float(acting) or space.longest)
         end = np.pi / space.step if space.step else _last_met(space, functions)
         if not space.step:
             end = min(end, 1e3 * self.further * turn) + self.further * turn
@@ -245,9 +247,9 @@ class _Search:
         s = (s - move)[here]
         s = s[np.argsort(-s.real, kind="stable")][:most]
         # Next to lightly damped poles rounding may hide D; its roots there lie next to them.
-        return self.led(np.append(s, self.poles + 1j * begin))
+        return self.led(np.append(s, self.poles + 1j * begin), turn)
 
-    def led(self, s: ComplexArray, known: Iterable[complex] = ()) -> ComplexArray:
+    def led(self, s: ComplexArray, turn: float, known: Iterable[complex] = ()) -> ComplexArray:
         """Return where Newton's method comes close to a root, the rightmost first.
 
         Known roots are divided out.
@@ -263,7 +265,6 @@ class _Search:
             rounding = np.where(step == 0.0, 0.0, ROUNDING * off * np.abs(step))
             s, length = s - move, np.abs(move) + rounding
         # Slow roots are far smaller than a turn.
-        turn = 2.0 * np.pi * self.unit
         found = s[length <= np.minimum(1e-5 * turn, 1e-3 * np.abs(s) + _SLOWEST * turn)]
         return found[np.argsort(-found.real, kind="stable")]
 
@@ -382,7 +383,8 @@ class _Search:
                 starts = np.concatenate((self.poles, known, [line]))
                 starts = starts[np.argsort(np.abs(starts - line))][: _MOST_STARTS // 6]
                 around = np.abs(starts) + 1e-9 * self.unit
-                new = keep(self.led((starts[:, None] + around[:, None] * turns).ravel(), known))
+                starts = (starts[:, None] + around[:, None] * turns).ravel()
+                new = keep(self.led(starts, 2.0 * np.pi * self.unit, known))
             if missing <= 0 or self.steps > _ALL_STEPS:
                 break
             self.further = min(2.0 * self.further, _MOST_TURNS_FURTHER)
