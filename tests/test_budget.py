@@ -205,3 +205,11 @@ def test_arms_that_cancel_at_low_frequency_leave_their_digits(omega):
     assert transfer(FLIGHT, "common", 1j * omega) == pytest.approx(common, rel=1e-7, abs=0)
     found = transfer(FLIGHT, "differential", 1j * omega)
     assert found == pytest.approx(differential, rel=1e-7, abs=0)
+
+
+@pytest.mark.parametrize("loop", [FLIGHT, DualArm(), SingleArm()], ids=range(3))
+@pytest.mark.parametrize("source", ["laser", "arm 1", "arm 2", "common", "differential"])
+def test_a_response_is_that_of_the_closed_loop_also_at_poles_of_the_open_one(loop, source):
+    at = np.concatenate(([0.0], 1j * np.geomspace(1e-9, 1e3, 50), [-0.01 + 0.3j]))
+    found = transfer(loop, source, at)
+    assert found == pytest.approx(loop.response(source)(at), rel=1e-12)

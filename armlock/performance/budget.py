@@ -236,7 +236,9 @@ def noise_budget(
     shot, clock = not_negative("shot", shot), not_negative("clock", clock)
     require_stable_loop(loop)
     s = 2j * np.pi * f
-    arms = np.array([transfer(loop, "arm 1", s), transfer(loop, "arm 2", s)])
+    laser_locked = transfer(loop, "laser", s)
+    # As `transfer` does, but for a sign, which no power has.
+    arms = np.array([laser_locked * path for path in loop.arm_responses(s)])
     beats, tau = np.array(LEVELS.beat_notes)[:, None], np.array([[loop.tau1], [loop.tau2]])
     # An arm's noise in cycles is turned into a frequency by 2 pi f.
     motion = LEVELS.motion * np.abs(s) / np.sqrt(1.0 + (f / LEVELS.motion_corner) ** 4)
@@ -247,7 +249,7 @@ def noise_budget(
         return np.asarray(np.hypot(together, np.linalg.norm(separate * arms, axis=0)))
 
     locked = {
-        "laser": np.abs(transfer(loop, "laser", s)) * free,
+        "laser": np.abs(laser_locked) * free,
         "shot": np.sqrt(2.0) * shot * np.abs(s) * through(0.0, 1.0),
         "clock": clock / np.sqrt(f) * through(beats, beats),
         "motion": motion * through(1.0 + np.exp(-s * tau), 2.0),

@@ -6,9 +6,10 @@ laser pulling are computed from these responses.
 
 from __future__ import annotations
 
+import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import ComplexArray
+from armlock.checks import ComplexArray, complex_array, one_of
 from armlock.engine.functions import common_zeros
 from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import decided, require_stable
@@ -57,7 +58,17 @@ def transfer(
     >>> print(f"{abs(transfer(flight_loop(), 'laser', 2j * 3.141592653589793 * 3e-3)):.2e}")
     1.13e-05
     """
-    return checked_loop(loop).response(source)(s)
+    one_of("source", source, ("laser", *checked_loop(loop).paths))
+    s = complex_array("s", s)
+    # The closed system takes more bits than the open loop does, and has its limits at poles.
+    with np.errstate(all="ignore"):
+        found = np.asarray(1.0 / (1.0 + loop(s)))
+        if source != "laser":
+            found = np.asarray(-loop.paths[source](s) * found)
+    at_poles = ~np.isfinite(found)
+    if at_poles.any():
+        found[at_poles] = loop.response(source)(s[at_poles])
+    return found
 
 
 def require_stable_loop(loop: Loop) -> None:
