@@ -835,7 +835,7 @@ class System:
         TypeError, ValueError
             If the system has delays, or is an equation, or a parameter has no nominal value.
         """
-        return self._roots_of("poles")
+        return self._zeros_and_poles[1].copy()
 
     def zeros(self) -> ComplexArray:
         """Return the zeros of a system without delays, in rad/s, as python-control has them.
@@ -845,19 +845,20 @@ class System:
         TypeError, ValueError
             As `poles`.
         """
-        return self._roots_of("zeros")
+        return self._zeros_and_poles[0].copy()
 
-    def _roots_of(self, what: str) -> ComplexArray:
-        """Return the zeros or the poles, with nominal parameters."""
+    @cached_property
+    def _zeros_and_poles(self) -> tuple[ComplexArray, ComplexArray]:
+        """Zeros and poles with nominal parameters."""
         if self.is_equation or self.longest_delay:
             raise ValueError(
-                f"{what} are those of a system without delays, got {self!r:.200}: write "
-                "armlock.characteristic_roots(L, right_of=...), which has the roots of an "
-                "equation, or of the closed loop of L"
+                f"zeros and poles are those of a system without delays, got {self!r:.200}: "
+                "write armlock.characteristic_roots(L, right_of=...), which has the roots of "
+                "an equation, or of the closed loop of L"
             )
         above, below = self.at(**self.given((), {})).rational()
-        part = above if what == "zeros" else below
-        return np.array(Polynomial.of(part).roots, np.complex128)
+        zeros, poles = (np.array(Polynomial.of(p).roots, np.complex128) for p in (above, below))
+        return zeros, poles
 
     def isdtime(self, strict: bool = False) -> bool:
         """Whether time is discrete: it is not. So python-control's plots take the system."""

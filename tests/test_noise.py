@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armlock import Controller, LaserNoise, PerturbationNoise, ShapedNoise
+from armlock import LaserNoise, PerturbationNoise, ShapedNoise
 from armlock.timedomain.discretize import sampled_filter, stationary_root
 from armlock.timedomain.spectra import SpectrumEstimator
 from tests.test_in_time import ends_when_interrupted
@@ -118,7 +118,7 @@ def test_a_filter_over_many_decades_starts_in_the_middle_of_its_course():
         size = 10.0 ** rng.uniform(-6.0, 3.0)
         poles += [size * complex(-0.1, 1.0), size * complex(-0.1, -1.0)]
         zeros = -(10.0 ** rng.uniform(-6.0, 3.0, len(poles) - 1))
-        sampled = sampled_filter(Controller(zeros.tolist(), poles, 1.0), 200.0)
+        sampled = sampled_filter(zeros.tolist(), poles, 1.0, 200.0)
         expected = covariance(sampled)
         root = stationary_root(sampled)
         size = np.sqrt(np.diag(expected))

@@ -28,7 +28,7 @@ from numpy.polynomial import polynomial as poly
 from armlock.checks import ComplexArray, FloatArray, positive_number, real_array
 from armlock.compiled import njit
 from armlock.sensors import SignalMapping
-from armlock.systems import Controller, System
+from armlock.systems import System
 
 #: Rows of numbers, in the form that lets the compiler unroll loops over them.
 Rows = tuple[tuple[float, ...], ...]
@@ -120,7 +120,9 @@ def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     return np.asarray(2.0 * rate * np.tan(0.5 * real_array("omega", omega) / rate))
 
 
-def sampled_filter(controller: System, sample_rate: float) -> SampledFilter:
+def sampled_filter(
+    zeros: Sequence[complex], poles: Sequence[complex], gain: float, sample_rate: float
+) -> SampledFilter:
     r"""Apply the trapezoidal rule to zeros, poles and gain.
 
     With h half the sampling step T, each pole or zero p becomes
@@ -134,8 +136,10 @@ def sampled_filter(controller: System, sample_rate: float) -> SampledFilter:
 
     Parameters
     ----------
-    controller : System
-        Zeros, poles and gain, with no more zeros than poles.
+    zeros, poles : sequence of complex
+        In rad/s, no more zeros than poles.
+    gain : float
+        Factor in front.
     sample_rate : float
         In Hz.
 
@@ -154,25 +158,24 @@ def sampled_filter(controller: System, sample_rate: float) -> SampledFilter:
     t2 are differences and products of differences that lose no digits, however far poles and
     zeros lie apart.
     """
-    zeros: ComplexArray = np.array(controller.zeros(), dtype=complex)
-    poles: ComplexArray = np.array(controller.poles(), dtype=complex)
-    if zeros.size > poles.size:
+    z: ComplexArray = np.array(zeros, dtype=complex)
+    p: ComplexArray = np.array(poles, dtype=complex)
+    if z.size > p.size:
         raise ValueError(
-            f"controller must be proper, got more zeros than poles: {zeros.size} and "
-            f"{poles.size}"
+            f"controller must be proper, got more zeros than poles: {z.size} and {p.size}"
         )
     half = 0.5 / positive_number("sample_rate", sample_rate)
-    at_infinity = poles.size - zeros.size
-    factors = np.append(1.0 - half * zeros, np.full(at_infinity, half)) / (1.0 - half * poles)
-    finite = 2.0 * half * zeros / (1.0 - half * zeros)
+    at_infinity = p.size - z.size
+    factors = np.append(1.0 - half * z, np.full(at_infinity, half)) / (1.0 - half * p)
+    finite = 2.0 * half * z / (1.0 - half * z)
     above = _pairs([*finite, *[-2.0 + 0j] * at_infinity])
-    below = _pairs([*(2.0 * half * poles / (1.0 - half * poles))])
+    below = _pairs([*(2.0 * half * p / (1.0 - half * p))])
     sections = tuple(
         (r1, r2, k, (r1 - a1) + (r2 - a2), (r2 - a1) * (r2 - a2) + (b - k))
         for (r1, r2, k), (a1, a2, b) in zip(below, above, strict=True)
     )
-    gain = controller.gain * float(np.prod(factors).real)
-    return SampledFilter(gain, sections or (_NO_SECTION,), poles.size)
+    whole = gain * float(np.prod(factors).real)
+    return SampledFilter(whole, sections or (_NO_SECTION,), p.size)
 
 
 def _pairs(roots: list[complex]) -> Rows:
@@ -340,7 +343,7 @@ def sampled_loop(
             denominator = poly.polymul(denominator, _slowest(poles))
         else:
             break
-    filtered = sampled_filter(Controller(zeros, poles, controller.gain), sample_rate)
+    filtered = sampled_filter(zeros, poles, controller.gain, sample_rate)
     return sampled_sensor(numerators, denominator, sample_rate), filtered
 
 

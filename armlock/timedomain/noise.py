@@ -106,7 +106,7 @@ class ShapedNoise(Shown):
             if pole.real >= 0.0:
                 raise ValueError(f"poles must lie in the left half-plane, got {pole} rad/s")
         self._random = np.random.default_rng(whole_number("seed", seed, 0))
-        self._sampled = sampled_filter(self._filter, self.sample_rate)
+        self._sampled = sampled_filter(zeros, poles, gain, self.sample_rate)
         # White samples of variance one have the one-sided density 2 / sample_rate.
         self._scale = math.sqrt(0.5 * self.sample_rate)
         self._state = np.zeros(2 * len(self._sampled.sections))
