@@ -47,10 +47,8 @@ def test_the_units_of_the_parameters_move_no_pole(factor):
     # The determinant is -2 omega cos(omega): poles at odd multiples of pi / 2.
     omega = np.linspace(0.0, 6.0 * np.pi, 25)
     expected = np.array(d_curve(plain, omega))
-    finite = np.abs(expected[0]) < 1e9
-    assert np.flatnonzero(~finite).tolist() == [0, 2, 6, 10, 14, 18, 22]
-    found = factor * np.array(d_curve(scaled, omega))
-    np.testing.assert_allclose(found[:, finite], expected[:, finite], rtol=1e-9)
+    assert np.flatnonzero(np.isnan(expected[0])).tolist() == [0, 2, 6, 10, 14, 18, 22]
+    np.testing.assert_allclose(factor * np.array(d_curve(scaled, omega)), expected, rtol=1e-9)
 
 
 def test_branches_of_the_common_arm_end_at_the_poles():

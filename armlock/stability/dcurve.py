@@ -19,6 +19,7 @@ from armlock.engine.affine import Affine, functions
 from armlock.engine.functions import at
 from armlock.engine.polynomials import collected, polynomial, rounded
 from armlock.engine.tolerances import EPSILON
+from armlock.engine.values import newton
 from armlock.stability.counts import CountError
 from armlock.stability.crossings import crossings
 from armlock.systems import Lag, Sum, System
@@ -117,14 +118,20 @@ class _Curve:
         )  # fmt: skip
         groups = [[{Lag.after(time): p for time, p in part.items()}] for part in parts]
         self.functions = functions(groups, system.step)
+        self.newton = newton(self.functions[5])
 
     def at(self, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the points of the curve; nan at omega = 0, and large or nan next to a pole."""
+        """Return the points of the curve; nan where rounding hides the determinant."""
         shape, omega = np.shape(omega), np.abs(np.ravel(omega))
         with np.errstate(all="ignore"):
             known, shared, b, c, one, above, turned = at(self.functions, omega)
             known, determinant = known / shared, (above / turned).imag / 2.0
-            determinant = np.where(omega == 0.0, np.nan, determinant)
+            # What the frequency is rounded by hides the determinant next to its zeros.
+            near = np.abs(determinant) < 1e-6 * np.abs(b * c / one**2)
+            step, _ = self.newton.roughly(1j * omega[near], (1.0,))
+            hidden = omega == 0.0
+            hidden[near] |= np.abs(step) <= 4.0 * EPSILON * omega[near]
+            determinant = np.where(hidden, np.nan, determinant)
             x = self.affine.origin[0] - (known * np.conj(c / one)).imag / determinant
             y = self.affine.origin[1] + (known * np.conj(b / one)).imag / determinant
         return x.reshape(shape), y.reshape(shape)
@@ -147,8 +154,8 @@ def d_curve(
     Returns
     -------
     x, y : float arrays, shaped like `omega`
-        The point of the curve, far away or nan at its poles. At omega = 0 every point of the
-        line `d_curve_line(system)` has a root, and nan is returned too.
+        The point of the curve, nan where the curve has a pole. At omega = 0 every point of
+        the line `d_curve_line(system)` has a root, and nan is returned too.
 
     Raises
     ------
