@@ -84,7 +84,11 @@ def test_the_budget_takes_other_levels_and_names_its_own():
     for name, share in shares.items():
         assert other.sources[name] == pytest.approx(share * usual.sources[name], rel=1e-12)
     assert np.array_equal(other.sources["motion"], usual.sources["motion"])
-    wrong: list[Any] = [lambda _: 1.0, lambda x: np.nan * x]
+    by_function = noise_budget(FLIGHT, f, laser=lambda x: 30.0 / x)
+    assert by_function.sources["laser"] == pytest.approx(other.sources["laser"], rel=1e-6)
+    wrong: list[Any] = [
+        lambda x: -1.0 / x, lambda _: 1.0, lambda x: np.nan * x, lambda x: x[:1],
+    ]  # fmt: skip
     for one in wrong:
         with pytest.raises(ValueError, match=r"^laser\(frequency\) must "):
             noise_budget(FLIGHT, f, laser=one)

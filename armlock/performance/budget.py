@@ -207,8 +207,8 @@ def noise_budget(
     ------
     TypeError, ValueError
         If `loop` is no `Loop` or not stable, the frequencies are not positive and
-        one-dimensional, `laser` does not return a density for each, or another level is
-        negative.
+        one-dimensional, `laser` does not return a density for each frequency, or another
+        level is negative.
 
     References
     ----------
@@ -232,7 +232,17 @@ def noise_budget(
     As a table: ``pandas.DataFrame(found.sources, index=found.frequency)``.
     """
     f = axis("frequency", positive_array("frequency", frequency))
+    if not callable(laser):
+        raise TypeError(
+            "laser must be a function of the frequency in Hz, such as the method asd of a "
+            f"LaserNoise, got {laser!r:.200}"
+        )
     free = finite_series("laser(frequency)", laser(f))
+    if free.shape != f.shape or (free < 0.0).any():
+        raise ValueError(
+            "laser(frequency) must hold no negative number and have the shape of frequency, "
+            f"{f.shape}, got shape {free.shape} and {free.min(initial=0.0)} as the least"
+        )
     shot, clock = not_negative("shot", shot), not_negative("clock", clock)
     require_stable_loop(loop)
     s = 2j * np.pi * f
