@@ -20,7 +20,7 @@ export MPLCONFIGDIR := $(CURDIR)/$(VENV)/matplotlib
 export IPYTHONDIR := $(CURDIR)/$(VENV)/ipython
 # The matrices here are small, and several processes share the machine.
 export OPENBLAS_NUM_THREADS := 1
-unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV MPLBACKEND
+unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV MPLBACKEND PYTHONDONTWRITEBYTECODE
 
 # Two makes in one folder must not build the same files: the second waits for the first.
 alone = mkdir -p build; $(PYTHON) tools/alone.py build/lock $(MAKE) --no-print-directory
