@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import FloatArray, finite_series, positive_array
+from armlock.checks import ComplexArray, FloatArray, finite_series, positive_array
 from armlock.loops import Loop
 from armlock.performance.transfer import require_stable_loop
 
@@ -178,31 +178,44 @@ def _errors(common: npt.ArrayLike, differential: npt.ArrayLike) -> FloatArray:
 class _Response:
     """The responses of a loop to both errors, from time zero to past a duration."""
 
+    @np.errstate(all="ignore")
     def __init__(self, loop: Loop, duration: float) -> None:
-        self.duration = duration
+        self.paths, self.duration = loop.paths, duration
         self.step, self.shift = 2.0 * duration / _SAMPLES, _DAMPED / (2.0 * duration)
         self.time: FloatArray = self.step * np.arange(9 * _SAMPLES // 16, dtype=np.float64)
+        self.growth = np.exp(self.shift * self.time)
         omega = 2.0 * np.pi * np.fft.rfftfreq(_SAMPLES, self.step)
         self.s = self.shift + 1j * omega
+        self._require_finite(self.s[[0, -1]] ** -3)
         smooth = np.exp(-0.5 * (omega * _SMOOTHED * self.step) ** 2)
-        with np.errstate(all="ignore"):
-            # The closed loop is one system too, but takes more bits where the arms cancel.
-            smooth = -smooth / (1.0 + loop(self.s))
-            self.found = [smooth * loop.paths[source](self.s) for source in _SOURCES]
+        # The closed loop is one system too, but takes more bits where the arms cancel.
+        self.closed = -smooth / (1.0 + loop(self.s))
+        self.found: dict[str, ComplexArray] = {}
+
+    def of(self, source: str) -> ComplexArray:
+        """Return the response to one of the errors, which is computed when it is asked for."""
+        if source not in self.found:
+            self.found[source] = self.closed * self.paths[source](self.s)
+        return self.found[source]
 
     @np.errstate(all="ignore")
     def to(self, errors: FloatArray) -> tuple[FloatArray, float]:
         """Return the frequency of the laser, and after which time it is below rounding."""
         total = np.zeros(self.s.shape, dtype=np.complex128)
-        for response, (nu0, gamma, alpha) in zip(self.found, errors, strict=True):
-            total += response * (nu0 / self.s + gamma / self.s**2 + alpha / self.s**3)
-        if not np.isfinite(total).all():
+        for source, error in zip(_SOURCES, errors.tolist(), strict=True):
+            # Few errors hold all three terms, and each takes as long as the transform.
+            terms = [x / self.s**k for k, x in enumerate(error, 1) if x]
+            if terms:
+                total += self.of(source) * sum(terms)
+        self._require_finite(total)
+        frequency = np.fft.irfft(total, _SAMPLES)[: self.time.size] / self.step * self.growth
+        rounding = _ROUNDING * np.abs(total).sum() / (_SAMPLES * self.step) * self.growth
+        above = np.flatnonzero(np.abs(frequency) >= rounding)
+        return np.asarray(frequency), float(self.time[above[-1]])
+
+    def _require_finite(self, values: npt.NDArray[Any]) -> None:
+        if not np.isfinite(values).all():
             raise ValueError(
                 "time must not be so short or long that its third power overflows, got times "
                 f"next to {self.duration:g} s"
             )
-        growth = np.exp(self.shift * self.time)
-        frequency = np.fft.irfft(total, _SAMPLES)[: self.time.size] / self.step * growth
-        rounding = _ROUNDING * np.abs(total).sum() / (_SAMPLES * self.step) * growth
-        above = np.flatnonzero(np.abs(frequency) >= rounding)
-        return np.asarray(frequency), float(self.time[above[-1]])
