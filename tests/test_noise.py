@@ -2,7 +2,7 @@
 
 from typing import Any
 
-import mpmath
+import flint
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from armlock import LaserNoise, PerturbationNoise, ShapedNoise
 from armlock.timedomain.discretize import sampled_filter, stationary_root
 from armlock.timedomain.spectra import SpectrumEstimator
+from tests import draws
 from tests.test_in_time import ends_when_interrupted
 
 SOURCES: dict[str, Any] = {
@@ -86,7 +87,7 @@ def test_a_series_starts_in_the_middle_of_its_course():
         poles = [-1 + 9j, -1 - 9j, -4.0]
         return ShapedNoise([-5.0], poles, 1.0, seed=seed, sample_rate=10.0)
 
-    first = np.array([source(seed).draw(4) for seed in range(3000)])
+    first = np.array([source(seed).draw(4) for seed in range(draws(1000, 3000))])
     later = source(5000).draw(2_000_000)
     expected = [float(np.mean(later[: later.size - k] * later[k:])) for k in range(4)]
     found = [np.mean(first[:, 0] * first[:, k]) for k in range(4)]
@@ -127,24 +128,28 @@ def test_a_filter_over_many_decades_starts_in_the_middle_of_its_course():
 
 
 def covariance(sampled):
-    """Covariance of the states under white noise, in 120 digits: the sum of 2^80 samples."""
-    n = 2 * len(sampled.sections)
-    with mpmath.workdps(120):
-        change, drive = mpmath.zeros(n, n), mpmath.zeros(n, 1)
-        shares = [mpmath.mpf(t) for *_, t1, t2 in sampled.sections for t in (t1, t2)]
+    """Covariance of the states under white noise, in 600 digits: the sum of 2^80 samples."""
+    n, order = 2 * len(sampled.sections), sampled.order
+    with flint.ctx.workprec(2000):
+        change, drive = flint.arb_mat(n, n), flint.arb_mat(n, 1)
+        shares = [flint.arb(t) for *_, t1, t2 in sampled.sections for t in (t1, t2)]
         for i, (r1, r2, k, _, _) in enumerate(sampled.sections):
-            change[2 * i, : 2 * i] = mpmath.matrix([shares[: 2 * i]]) if i else 0
-            change[2 * i, 2 * i], change[2 * i, 2 * i + 1] = r1, -mpmath.mpf(k)
+            for j in range(2 * i):
+                change[2 * i, j] = shares[j]
+            change[2 * i, 2 * i], change[2 * i, 2 * i + 1] = r1, -flint.arb(k)
             change[2 * i + 1, 2 * i], change[2 * i + 1, 2 * i + 1] = 1, r2
-            drive[2 * i] = 1
-        order = sampled.order
-        change, drive = change[:order, :order], drive[:order, :]
-        total = drive * drive.T
+            drive[2 * i, 0] = 1
+        # An odd last section has one state.
+        change, drive = (
+            flint.arb_mat([row[: min(order, m.ncols())] for row in m.tolist()[:order]])
+            for m in (change, drive)
+        )
+        total, one = drive * drive.transpose(), flint.arb_mat(order, order, 1)
         for _ in range(80):
-            carried = mpmath.eye(order) + change
-            total += carried * total * carried.T
+            carried = one + change
+            total += carried * total * carried.transpose()
             change = 2 * change + change * change
-        return np.array(total.tolist(), dtype=float)
+        return np.array([[float(x) for x in row] for row in total.tolist()])
 
 
 def test_noise_without_a_finite_rms_is_refused():
@@ -164,7 +169,7 @@ def test_a_filter_without_poles_leaves_white_noise():
     found = source.draw(200_000)
     white = np.random.default_rng(1).standard_normal(found.size)
     # One-sided, over half the rate: the variance is 2^2 times 25.
-    assert found == pytest.approx(-10.0 * white, rel=1e-14)
+    np.testing.assert_allclose(found, -10.0 * white, rtol=1e-14, strict=True)
     assert source.sampled_asd([0.0, 25.0]).tolist() == [2.0, 2.0]
 
 
@@ -202,7 +207,8 @@ def test_rms_is_that_of_what_is_drawn(name):
     frequency = np.geomspace(1e-11, 0.499999 * source.sample_rate, 200_001)
     variance = np.trapezoid(source.sampled_asd(frequency) ** 2 * frequency, np.log(frequency))
     assert source.rms == pytest.approx(np.sqrt(variance), rel=1e-4)
-    quick = [SOURCES[name](seed, 10.0).draw(1)[0] for seed in range(4000)]
+    seeds = range(draws(1000, 4000))
+    quick = [SOURCES[name](seed, 10.0).draw(1)[0] for seed in seeds]
     assert np.std(quick) == pytest.approx(source.rms, rel=0.05)
 
 

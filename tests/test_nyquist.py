@@ -274,7 +274,7 @@ def test_a_picture_shows_a_resonance_between_its_even_samples():
 
     loop = (control.tf([0.1], [1, 0.2]) + control.tf([1.8e-3, 0], [1, 6e-4, 9])) * delay(1.0)
     curve = nyquist(loop)
-    omega = 3.0 + np.linspace(-2e-3, 2e-3, 100_001)
+    omega = 3.0 + np.linspace(-2e-3, 2e-3, 2001)
     assert abs(curve.response).max() == pytest.approx(abs(loop(1j * omega)).max(), rel=1e-3)
     turns = np.unwrap(
         np.angle(1.0 + np.concatenate((curve.response[::-1].conj(), curve.response)))
@@ -301,7 +301,8 @@ def test_a_curve_is_computed_when_it_is_read(monkeypatch):
         assert curve.encirclements == 0
         with pytest.raises(AssertionError, match="was computed"):
             _ = curve.response
-    assert curve.response == pytest.approx(paper_loop()(1j * curve.omega), rel=1e-12)
+    expected = paper_loop()(1j * curve.omega)
+    np.testing.assert_allclose(curve.response, expected, rtol=1e-12, strict=True)
 
 
 def test_a_curve_of_terms_that_cancel_has_all_digits():

@@ -102,7 +102,7 @@ class ShapedNoise(Shown):
     ) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self._filter = Controller(zeros, poles, gain)
-        for pole in self._filter.poles():
+        for pole in map(complex, poles):
             if pole.real >= 0.0:
                 raise ValueError(f"poles must lie in the left half-plane, got {pole} rad/s")
         self._random = np.random.default_rng(whole_number("seed", seed, 0))
