@@ -351,14 +351,14 @@ class _Search:
     @np.errstate(all="ignore")
     def right_of(self, sigma: float, number: int) -> list[_Disc]:
         """Return discs of all roots right of a line, of which there are so many, or of some."""
-        found, places = list[_Disc](), np.zeros(0, np.complex128)
+        found, places, radii = list[_Disc](), np.zeros(0, np.complex128), np.zeros(0)
         if self.at_zero and sigma < 0.0:
             number -= self.at_zero
         missing = number
 
         def keep(starts: ComplexArray) -> bool:
             """Enclose what is new, and tell whether something was."""
-            nonlocal places, missing
+            nonlocal places, radii, missing
             before = missing
             for start in starts.tolist():
                 there = complex(start.real, abs(start.imag))
@@ -367,11 +367,13 @@ class _Search:
                 disc = self.balls.enclosed(there)
                 if disc is None or not disc.centre.real - disc.radius > sigma:
                     continue
-                # Discs are far smaller than this.
-                close = np.flatnonzero(np.abs(places - disc.root) <= 0.1 * abs(disc.root))
-                if not any(disc.meets(found[k]) for k in close):
+                # A root is its disc's centre but for a radius in either part, and for rounding.
+                reach, radius = 1e-9 * abs(disc.root), 3.0 * float(disc.radius)
+                close = np.abs(places - disc.root) <= reach + radius + radii
+                if not any(disc.meets(found[k]) for k in np.flatnonzero(close)):
                     found.append(disc)
-                    places, missing = np.append(places, disc.root), missing - len(disc.roots)
+                    places, radii = np.append(places, disc.root), np.append(radii, radius)
+                    missing -= len(disc.roots)
             return missing < before
 
         turns, line = np.exp(2j * np.pi * (np.arange(6) + 0.3) / 6.0), sigma
