@@ -411,10 +411,11 @@ def _agree(n: Function, m: Function, omega: FloatArray, value: FloatArray) -> Bo
 
     The interval in which it does grows from the next floats to a millionth of the frequency.
     """
-    found, open_ = np.zeros(omega.size, np.bool_), np.ones(omega.size, np.bool_)
+    found, open_ = np.zeros(omega.size, np.bool_), np.arange(omega.size)
     for width in EPSILON * 8.0 ** np.arange(1, 12):
-        below, above = (_response(n, m, omega * (1.0 + k * width)) for k in (-1, 1))
-        between = open_ & ((below.imag < 0.0) != (above.imag < 0.0))
-        found |= between & (np.abs(above.real - below.real) <= _AGREED * np.abs(value))
-        open_ &= ~between
+        below, above = (_response(n, m, omega[open_] * (1.0 + k * width)) for k in (-1, 1))
+        between = (below.imag < 0.0) != (above.imag < 0.0)
+        near = np.abs(above.real - below.real) <= _AGREED * np.abs(value[open_])
+        found[open_] = between & near
+        open_ = open_[~between]
     return found
