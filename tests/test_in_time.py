@@ -36,8 +36,8 @@ from armlock.performance.pulling import pulling
 from tests import attack, draws
 from tests.attack_judge import Sketch, UndecidedError, View
 
-# Nobody waits longer. The slowest call here finds 30 000 crossings in 10 s: what is meant is a
-# call that does not end, not how fast a machine is.
+# Nobody waits longer. The slowest call, of the first case near zero, finds 30 000 crossings in
+# 10 s: what is meant is a call that does not end, not how fast a machine is.
 LATEST = 60.0
 
 
@@ -148,7 +148,7 @@ def compiled():
 
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_every_question_is_answered_or_refused_in_time(kind):
-    assert late(kind, range(draws(2, 60))) == []
+    assert late(kind, range(draws(1, 0), draws(3, 60))) == []
 
 
 # Each takes some seconds: the delayed terms exceed the others up to 1e6 rad/s.
