@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 _SMALL, _LARGE = 1e-3, 1e12
 # More crossings than this are not looked for: each takes a step or more.
 _MOST_CROSSINGS = 1e7
+# How many of them are told apart in one turn of the longest delay, to estimate their number.
+_SAMPLES_A_TURN = 32
 # To this share L has to agree at both ends of the interval that holds a crossing.
 _AGREED = 1e-3
 # Crossings that a table shows.
@@ -372,7 +374,9 @@ def axis_crossings(
         raise CountError(f"no crossings{place(point)}: L is real near s = 0", point[None])
     if begin >= omega_max:
         return AxisCrossings(np.empty(0), np.empty(0))
-    about = _crossings_expected(n, m, np.geomspace(begin, omega_max, 200), least)
+    turns, about = omega_max * n.space.longest / (2.0 * np.pi), 0.0
+    if turns * _SAMPLES_A_TURN > _MOST_CROSSINGS:
+        about = _crossings_expected(n, m, np.geomspace(begin, omega_max, 200), least)
     if about > _MOST_CROSSINGS:
         raise CountError(
             f"no crossings{place(point)}: there are about {about:.0e} up to {omega_max:.3g} "
@@ -400,10 +404,10 @@ def axis_crossings(
 
 def _crossings_expected(n: Function, m: Function, omega: FloatArray, least: float) -> float:
     """About how many crossings there are, from one turn of the longest delay at frequencies."""
-    turn = 2.0 * np.pi / n.space.longest if n.space.longest else 0.0
-    value = _response(n, m, np.add.outer(omega, np.linspace(0.0, turn, 33)))
+    turn = 2.0 * np.pi / n.space.longest
+    value = _response(n, m, np.add.outer(omega, np.linspace(0.0, turn, _SAMPLES_A_TURN + 1)))
     crossed = np.diff(value.imag < 0.0, axis=1) & (value.real[:, 1:] < -least)
-    return float(np.trapezoid(crossed.sum(axis=1), omega) / turn) if turn else 0.0
+    return float(np.trapezoid(crossed.sum(axis=1), omega) / turn)
 
 
 def _agree(n: Function, m: Function, omega: FloatArray, value: FloatArray) -> BoolArray:
