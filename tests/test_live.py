@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import re
 import secrets
+from collections import defaultdict
 from typing import NamedTuple
 
 import control
@@ -402,12 +403,43 @@ def pytest_generate_tests(metafunc):
         metafunc.parametrize("window", windows, ids=str)
 
 
+@pytest.fixture(scope="module")
+def tabs(chromium):
+    """Lend a tab, and take it back: a new one costs as much as all that a page does in it."""
+    free = defaultdict(list)
+
+    def lend(**options):
+        kind = repr(options)
+        if not free[kind]:
+            permissions = ["clipboard-read", "clipboard-write"]
+            context = chromium.new_context(permissions=permissions, **options)
+            tab = context.new_page()
+            tab.set_default_timeout(25_000)
+            tab.add_init_script(RECORD)
+            tab.kind, tab.session = kind, context.new_cdp_session(tab)
+            free[kind].append(tab)
+        return free[kind].pop()
+
+    def take_back(tab):
+        # The next page finds no pointer over it, and no steps to go back.
+        tab.mouse.move(0, 0)
+        tab.goto("about:blank")
+        tab.session.send("Page.resetNavigationHistory")
+        free[tab.kind].append(tab)
+
+    return lend, take_back
+
+
 @pytest.fixture
-def show(chromium, tmp_path, window):
+def show(tabs, tmp_path, window):
     """Open a live part from disk in a window, with what follows its address."""
-    contexts, errors = [], []
+    lend, take_back = tabs
+    lent, errors = [], []
     style = (LIVE.parent / "live.css").read_text()
     touch = window.by == "touch"
+
+    def listen(error):
+        errors.append(str(error))
 
     def open_page(part, fragment="", live=LIVE, **options):
         file, script = tmp_path / "page.html", (live / "page.js").as_uri()
@@ -422,22 +454,18 @@ def show(chromium, tmp_path, window):
             f"<script src='{script}'></script></main>"
         )
         size = {"width": window.width, "height": 844 if touch else 900}
-        options["permissions"] = ["clipboard-read", "clipboard-write"]
-        contexts.append(
-            chromium.new_context(viewport=size, has_touch=touch, is_mobile=touch, **options)
-        )
-        tab = contexts[-1].new_page()
+        tab = lend(viewport=size, has_touch=touch, is_mobile=touch, **options)
+        lent.append(tab)
         tab.by = window.by
-        tab.set_default_timeout(25_000)
-        tab.add_init_script(RECORD)
-        tab.on("pageerror", lambda error: errors.append(str(error)))
+        tab.on("pageerror", listen)
         tab.goto(file.as_uri() + fragment)
         return tab
 
     yield open_page
+    for tab in lent:
+        take_back(tab)
+        tab.remove_listener("pageerror", listen)
     assert errors == []
-    for context in contexts:
-        context.close()
 
 
 #: Keeps what is written on canvases, newest last, and each canvas's places of lines.
@@ -475,6 +503,10 @@ def opened(show):
 
 
 CHART, PLANE = ".live-chart canvas", ".live-plane canvas"
+#: Addresses of no loop, from which one starts at once, and of loops whose numbers are cheap.
+NOTHING = "#s=none"
+SINGLE = "#s=single&t1=20.1&t2=19.9&g=1&z=&q=0&at=0,0,3"
+DUAL_ARM = "#s=dual&t1=20.1&t2=19.9&g=10&p=2.5&dt=0.2&z=0,-0.5&q=0,-0.1&at=1,1,0.3&u=Hz"
 
 
 def place(page, across, down, selector=CHART):
@@ -674,7 +706,7 @@ def test_numbers_and_sliders_stay_in_sight(opened, window):
 
 @pytest.mark.parametrize("window", WINDOWS[:1], ids=str)
 def test_no_number_that_the_keyboard_reaches_lies_under_the_panel(opened):
-    page = opened()
+    page = opened(NOTHING)
     start(page, "Dual arm")
     table(page)
     page.evaluate("scrollTo(0, document.body.scrollHeight)")
@@ -703,7 +735,7 @@ PASTE = "Paste a controller from MATLAB, Python or Julia"
 
 
 def test_a_printed_controller_is_understood_or_refused(opened):
-    page = opened()
+    page = opened(DUAL_ARM)
     paste(page, PRINTED)
     assert page.get_by_label("Start from").input_value() == ""
     code = page.locator("pre").text_content()
@@ -785,7 +817,7 @@ CHARTED = "() => /Refining|certain/.test(document.querySelector('.live-main').te
 
 
 def test_a_loop_that_is_left_keeps_no_other_waiting(opened):
-    page = opened()
+    page = opened(NOTHING)
     page.evaluate("""() => {
         const end = Worker.prototype.terminate;
         window.ended = 0;
@@ -803,7 +835,7 @@ def test_a_loop_that_is_left_keeps_no_other_waiting(opened):
 
 
 def test_what_takes_too_many_steps_is_refused_at_once(opened):
-    page = opened()
+    page = opened(NOTHING)
     start(page, WHITE_PAPER)
     type_in(page, "Gain", "496000")
     type_in(page, "Dead time in s", "0.035")
@@ -813,6 +845,8 @@ def test_what_takes_too_many_steps_is_refused_at_once(opened):
 
 
 def test_a_bad_link_is_said_and_left_as_it_is(opened):
+    page = opened(NOTHING)
+    file = page.url.removesuffix(NOTHING)
     for fragment, why in (
         ("#s=dual&t1=20&t2=19", "no “g=”"),
         ("#t1=20", "no “s=”"),
@@ -821,7 +855,10 @@ def test_a_bad_link_is_said_and_left_as_it_is(opened):
         ("#s=triple&t1=20&t2=19&g=1&z=&q=0", "unknown sensor triple"),
         ("#s=single&t1=20&t2=19&g=1&z=-1,-2&q=0", "2 zeros and 1 poles"),
     ):
-        page = opened(fragment)
+        # Opened anew: the page would stay where only the fragment is another.
+        page.goto("about:blank")
+        page.goto(file + fragment)
+        page.wait_for_selector("textarea", state="attached")
         assert why in page.locator("[role=alert]").text_content()
         page.wait_for_timeout(500)
         assert page.evaluate("location.hash") == fragment
@@ -832,7 +869,7 @@ def test_a_bad_link_is_said_and_left_as_it_is(opened):
 
 
 def test_the_pictures_show_the_margins_of_the_table(opened):
-    page = opened()
+    page = opened(NOTHING)
     start(page, WHITE_PAPER)
     found = table(page)
     assert found["Phase margin in degrees"] == ["28.6 at 1.95\xa0Hz"]
@@ -886,7 +923,7 @@ SPIKES = """async () => {
 
 
 def test_the_nyquist_curve_has_no_spikes(opened):
-    page = opened()
+    page = opened(NOTHING)
     start(page, WHITE_PAPER)
     table(page)
     places, spikes = page.evaluate(SPIKES)
@@ -905,7 +942,7 @@ def test_an_unstable_chart_is_not_called_undecided(opened):
 
 
 def test_no_preset_has_an_undecided_number_and_all_are_closed_loops(opened):
-    page = opened()
+    page = opened(NOTHING)
     assert page.get_by_role("button", name="Watch").count() == 0
     names = page.get_by_label("Start from").locator("option").all_inner_texts()
     assert len(names) == 9
@@ -939,7 +976,7 @@ SINES = """() => {
 
 def test_a_frame_is_drawn_fast_enough_while_a_slider_moves(opened):
     """Beside a fixed piece of work, in processor time: machines differ, and are shared."""
-    page = opened()
+    page = opened(NOTHING)
     start(page, WHITE_PAPER)
     table(page)
     session = page.context.new_cdp_session(page)
@@ -979,12 +1016,12 @@ def test_numbers_in_the_fields_are_short(opened, capsys):
 
 
 def test_errors_stand_at_the_field_that_was_edited(opened):
-    page = opened()
+    page = opened(DUAL_ARM)
     for label, typed, message in (
         ("Gain", "much", "The gain must be a number, got “much”."),
         ("Poles", "-0,1", "Write decimals with a point"),
-        ("Poles", "-0.1", "6 zeros and 1 poles"),
-        ("Zeros", "1, 2, 3, 4, 5, 6, 7", "7 zeros and 6 poles"),
+        ("Poles", "-0.1", "2 zeros and 1 poles"),
+        ("Zeros", "1, 2, 3", "3 zeros and 2 poles"),
         ("Delay τ₁ in s", "0", "τ₁ must be a positive number, got 0"),
         ("Dead time in s", "-1", "dead time must be zero or positive, got -1"),
         ("Gain", "0", "gain must be a number other than zero, got 0"),
@@ -1005,7 +1042,7 @@ def test_errors_stand_at_the_field_that_was_edited(opened):
 
 
 def test_sliders_follow_what_is_typed(opened):
-    page = opened()
+    page = opened(DUAL_ARM)
     dead, panel = page.get_by_label("Dead time:"), page.locator(".live-panel")
     field = type_in(page, "Dead time in s", "12.3 us")
     assert "delay=0.0000123," in page.locator("pre").text_content()
@@ -1044,7 +1081,7 @@ def test_undo_goes_back_through_the_address(opened):
 
 
 def test_a_slider_that_goes_on_moving_is_one_step_of_undo(opened):
-    page = opened()
+    page = opened(SINGLE)
     before = page.get_by_label("Gain", exact=True).input_value()
     for _ in range(3):
         page.get_by_role("slider", name="Gain factor").press("ArrowRight")
@@ -1068,7 +1105,7 @@ STANDS = """selector => {
 
 def test_a_pole_follows_the_hand(opened):
     """And the picture stays where it is: nothing above it changes its height."""
-    page = opened()
+    page = opened(NOTHING)
     start(page, "Common arm with lead filter")
     poles, zeros = (page.get_by_label(name, exact=True) for name in ("Poles", "Zeros"))
     before = table(page)["Rightmost root in rad/s"]
@@ -1093,7 +1130,7 @@ def test_a_pole_follows_the_hand(opened):
 
 
 def test_the_address_holds_all(opened):
-    page = opened()
+    page = opened(NOTHING)
     start(page, "Dual arm")
     type_in(page, "Zeros", "-0.5±2j")
     type_in(page, "Poles", "0, -0.1, -3±1j")
@@ -1117,7 +1154,7 @@ def test_the_address_holds_all(opened):
 
 def test_the_regions_are_drawn_while_a_slider_is_held(opened):
     # A chart dropped at each move would leave the one before until the slider rests.
-    page = opened()
+    page = opened(NOTHING)
     start(page, "Common arm")
     said(page)
     # How orange a corner is: full of roots, which at ten times the gain a coarse chart cannot
@@ -1134,7 +1171,7 @@ def test_the_regions_are_drawn_while_a_slider_is_held(opened):
 
 
 def test_a_frequency_lights_up_in_all_plots(opened):
-    page = opened()
+    page = opened(NOTHING)
     start(page, "Common arm")
     table(page)
     bode, nyquist = (f".live-main canvas >> nth={k}" for k in (3, 2))
@@ -1153,7 +1190,7 @@ def test_a_frequency_lights_up_in_all_plots(opened):
 
 
 def test_two_designs_stand_side_by_side(opened):
-    page = opened()
+    page = opened(NOTHING)
     start(page, "Common arm")
     alone = table(page)
     press(page, "Pin this loop")
@@ -1171,7 +1208,7 @@ def test_two_designs_stand_side_by_side(opened):
 
 
 def test_a_loop_that_is_pinned_at_once_gets_its_numbers(opened):
-    page = opened()
+    page = opened(NOTHING)
     start(page, "Dual arm")
     alone = table(page)
     start(page, "Single arm")
@@ -1231,7 +1268,7 @@ def test_a_bound_on_the_sensitivity_is_drawn_and_held_against_the_loop(opened):
 
 @pytest.mark.parametrize("window", PHONES, ids=str)
 def test_fingers_scroll_past_drag_and_zoom(opened):
-    page = opened()
+    page = opened(SINGLE)
     said(page)
 
     def view():
@@ -1263,7 +1300,7 @@ def test_fingers_scroll_past_drag_and_zoom(opened):
     # No key that a telephone lacks, and one word for what an unstable loop has none of.
     hold(page, 0.4, 0.4)
     assert "Held: a tap on it releases it." in said(page)
-    type_in(page, "Gain", "-5000")
+    type_in(page, "Gain", "-1")
     table(page)
     panel = page.locator(".live-summary strong").all_inner_texts()
     assert panel.count("–") == 5
@@ -1284,7 +1321,7 @@ def year_page(show, tmp_path):
 
 
 def test_the_year_takes_the_loop_of_the_page(opened, year_page):
-    page = opened()
+    page = opened(NOTHING)
     start(page, "Dual arm")
     type_in(page, "Gain", "7")
     link = page.get_by_role("link", name="Open this loop in orbit").get_attribute("href")

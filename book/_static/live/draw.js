@@ -53,8 +53,10 @@ const armlockDraw = (function () {
       new ResizeObserver(() => {
         // On paper it keeps its shape.
         if (printing) return;
-        this.wide = this.canvas.clientWidth;
-        this.high = Math.round(height(this.wide));
+        const wide = this.canvas.clientWidth, high = Math.round(height(wide));
+        // The height that it was given here is no change.
+        if (wide === this.wide && high === this.high) return;
+        [this.wide, this.high] = [wide, high];
         this.canvas.style.aspectRatio = `${this.wide} / ${this.high}`;
         this.now();
       }).observe(this.canvas);

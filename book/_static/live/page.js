@@ -322,8 +322,8 @@ function armlockPages() {
         this.chart.broken = design.breaks.flatMap((one, k) => one?.size > 0 && one.size < Infinity
           ? [{ place: WAYS[k].map(v => 1 + v * one.size), weakest: one.size === weakest?.size }] : []);
         this.heard();
-        // A margin may lie beyond what is drawn.
-        if (kind === "margins" && told === this.design?.told) this.respond(); else this.draw();
+        // A margin may lie beyond what is drawn. The plots show no other number.
+        if (kind === "margins" && told === this.design?.told) this.respond(); else this.chart.sheet.draw();
         this.write();
       });
     }
@@ -382,8 +382,10 @@ function armlockPages() {
         pinned.response = this.responseOf(pinned, point);
         this.beside ||= new Desk([...TOLD, ...BREAKS]);
         this.asks(this.beside, pinned, told, point, kind => {
-          if (kind === "margins") pinned.response = this.responseOf(pinned, point);
-          this.draw();
+          if (kind === "margins") {
+            pinned.response = this.responseOf(pinned, point);
+            this.draw();
+          }
           if (this.design) this.list();
         });
       }
