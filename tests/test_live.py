@@ -10,7 +10,7 @@ import itertools
 import re
 import secrets
 from collections import defaultdict
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import control
 import numpy as np
@@ -406,7 +406,7 @@ def pytest_generate_tests(metafunc):
 @pytest.fixture(scope="module")
 def tabs(chromium):
     """Lend a tab, and take it back: a new one costs as much as all that a page does in it."""
-    free = defaultdict(list)
+    free: dict[str, list[Any]] = defaultdict(list)
 
     def lend(**options):
         kind = repr(options)
@@ -720,6 +720,13 @@ def test_no_number_that_the_keyboard_reaches_lies_under_the_panel(opened):
                     && over.closest('.live-panel') && e.id; }"""
             )
             assert not hidden
+    # Pictures are drawn anew where their place is another.
+    for width in (1000, 1280):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_function(
+            "() => [...document.querySelectorAll('canvas')]"
+            ".every(c => c.width === c.clientWidth)"
+        )
 
 
 PRINTED = """<TransferFunction>: sys[1]
