@@ -98,7 +98,7 @@ def asked(rng, loop, point):
         "axis_crossings": partial(axis_crossings, loop, *point),
         "axis_crossings, up to": partial(axis_crossings, loop, *point, omega_max=100 * above),
         "box_count": partial(box_count, loop, attack.between(rng, 1e-9, 1e-2)),
-        "pulling": partial(pulling, loop, [0.1, 10.0, 1e3, 1e5]),
+        "pulling": partial(pulling, loop, [0.1, 10.0, 1e3, 1e5][:: draws(3, 1)]),
         "spectral_radius": lambda: spectral_radius(loop, point[0], point[1], step=step),
         "d_curve": partial(d_curve, loop, omega),
     }

@@ -47,7 +47,7 @@ from armlock.engine.polynomials import polynomial
 from armlock.engine.values import Quotient
 from armlock.paper import TAU1, TAU2
 from armlock.sensors import DIFFERENCE, SignalMapping
-from tests import dense, independent
+from tests import dense, draws, independent
 from tests.systems import NEUTRAL, RETARDED, two_delays
 
 MAP = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.5, order=1)
@@ -413,7 +413,7 @@ def test_powers_of_one_object_take_their_magnitudes_at_high_frequency():
 
 def test_chains_of_several_objects_raise_no_undocumented_error():
     z1, z2, k = delay(1.0), delay(1.3), parameter("k", 1.0)
-    for e in (0.01, 0.1, 0.3, 2.0):
+    for e in (0.1, 2.0, 0.01, 0.3)[: draws(2, 4)]:
         d = equation(((1 + e) + z1) * ((1 + e) + z1 * z2) * (s + k))
         # (1 + e)^2 + (1 + e) z1 + (1 + e) z1 z2 + z1^2 z2
         confined = (1 + e) ** 2 > 1 + 2 * (1 + e)
