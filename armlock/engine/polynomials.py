@@ -5,7 +5,7 @@ from __future__ import annotations
 import copyreg
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property, lru_cache, reduce
 from math import factorial
 from operator import mul
 from typing import Any, TypeVar
@@ -52,21 +52,7 @@ class Polynomial:
     @classmethod
     def of(cls, coefficients: fmpq_poly | Iterable[Any]) -> Polynomial:
         """Return the polynomial with these coefficients, ascending; zero has degree 0."""
-        p = polynomial(coefficients)
-        if not p:
-            return cls(p, ())
-        left, known, computed = p / p.leading_coefficient(), [], []
-        for root, number in _roots(left):
-            rest, missed = divmod(left, _factor(root) ** number)
-            pair = [root, root.conjugate()] if root.imag else [root]
-            if missed:
-                computed += pair * number
-            else:
-                left = rest
-                known += pair * number
-        places = range(len(known), len(known) + len(computed))
-        # Each of them is rounded by half an EPSILON.
-        return cls(p, (*known, *computed), frozenset(places), 0.51 * EPSILON * len(computed))
+        return _factored(tuple(polynomial(coefficients).coeffs()))
 
     def __bool__(self) -> bool:
         """Whether it is not zero."""
@@ -85,6 +71,26 @@ class Polynomial:
     def degree(self) -> int:
         """The degree."""
         return len(self.roots)
+
+
+@lru_cache(1 << 12)
+def _factored(coefficients: tuple[fmpq, ...]) -> Polynomial:
+    """Find the roots, once for all loops that differ in delays and parameters alone."""
+    p = fmpq_poly(list(coefficients))
+    if not p:
+        return Polynomial(p, ())
+    left, known, computed = p / p.leading_coefficient(), [], []
+    for root, number in _roots(left):
+        rest, missed = divmod(left, _factor(root) ** number)
+        pair = [root, root.conjugate()] if root.imag else [root]
+        if missed:
+            computed += pair * number
+        else:
+            left = rest
+            known += pair * number
+    places = range(len(known), len(known) + len(computed))
+    # Each of them is rounded by half an EPSILON.
+    return Polynomial(p, (*known, *computed), frozenset(places), 0.51 * EPSILON * len(computed))
 
 
 def exact(value: Any) -> fmpq:
