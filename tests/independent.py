@@ -138,7 +138,7 @@ def locked_paper_loop(noise, c1, c2, rate):
     return _run(noise, c1, c2, *delays, change, entry, readout, feed)
 
 
-@njit
+@njit(cache=True)
 def _run(noise, c1, c2, r1, r2, change, entry, readout, feed):
     phi, state, arms = np.zeros(noise.size), np.zeros(readout.size), np.zeros(2)
     for i in range(noise.size):
