@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 import re
 import secrets
-from collections import defaultdict
 from typing import Any, NamedTuple
 
 import control
@@ -406,26 +405,33 @@ def pytest_generate_tests(metafunc):
 @pytest.fixture(scope="module")
 def tabs(chromium):
     """Lend a tab, and take it back: a new one costs as much as all that a page does in it."""
-    free: dict[str, list[Any]] = defaultdict(list)
+    free: dict[bool, list[Any]] = {True: [], False: []}
 
-    def lend(**options):
-        kind = repr(options)
-        if not free[kind]:
-            permissions = ["clipboard-read", "clipboard-write"]
-            context = chromium.new_context(permissions=permissions, **options)
+    def lend(window, motion):
+        touch = window.by == "touch"
+        if not free[touch]:
+            context = chromium.new_context(
+                permissions=["clipboard-read", "clipboard-write"],
+                has_touch=touch,
+                is_mobile=touch,
+            )
             tab = context.new_page()
             tab.set_default_timeout(25_000)
             tab.add_init_script(RECORD)
-            tab.kind, tab.session = kind, context.new_cdp_session(tab)
-            free[kind].append(tab)
-        return free[kind].pop()
+            tab.session = context.new_cdp_session(tab)
+            free[touch].append(tab)
+        tab = free[touch].pop()
+        tab.set_viewport_size({"width": window.width, "height": 844 if touch else 900})
+        tab.emulate_media(reduced_motion=motion)
+        tab.by = window.by
+        return tab
 
     def take_back(tab):
         # The next page finds no pointer over it, and no steps to go back.
         tab.mouse.move(0, 0)
         tab.goto("about:blank")
         tab.session.send("Page.resetNavigationHistory")
-        free[tab.kind].append(tab)
+        free[tab.by == "touch"].append(tab)
 
     return lend, take_back
 
@@ -436,12 +442,11 @@ def show(tabs, tmp_path, window):
     lend, take_back = tabs
     lent, errors = [], []
     style = (LIVE.parent / "live.css").read_text()
-    touch = window.by == "touch"
 
     def listen(error):
         errors.append(str(error))
 
-    def open_page(part, fragment="", live=LIVE, **options):
+    def open_page(part, fragment="", live=LIVE, motion="no-preference"):
         file, script = tmp_path / "page.html", (live / "page.js").as_uri()
         head = "<meta name=viewport content='width=device-width'>"
         file.write_text(
@@ -453,10 +458,8 @@ def show(tabs, tmp_path, window):
             f"<div class='live' data-live='{part}'></div>"
             f"<script src='{script}'></script></main>"
         )
-        size = {"width": window.width, "height": 844 if touch else 900}
-        tab = lend(viewport=size, has_touch=touch, is_mobile=touch, **options)
+        tab = lend(window, motion)
         lent.append(tab)
-        tab.by = window.by
         tab.on("pageerror", listen)
         tab.goto(file.as_uri() + fragment)
         return tab
@@ -870,7 +873,7 @@ def test_a_bad_link_is_said_and_left_as_it_is(opened):
         page.wait_for_timeout(500)
         assert page.evaluate("location.hash") == fragment
         assert page.locator(".live-numbers").inner_text() == ""
-        start(page, "Dual arm")
+        start(page, "Single arm")
         assert "stable" in said(page)
         assert page.locator("[role=alert]").text_content() == ""
 
@@ -1324,7 +1327,7 @@ def year_page(show, tmp_path):
     for file in LIVE.glob("*.js"):
         (live / file.name).write_text(file.read_text())
     (live / "orbits.js").write_text(year.table())
-    return lambda *fragment: show("year", *fragment, live=live, reduced_motion="reduce")
+    return lambda *fragment: show("year", *fragment, live=live, motion="reduce")
 
 
 def test_the_year_takes_the_loop_of_the_page(opened, year_page):
