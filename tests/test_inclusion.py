@@ -5,15 +5,13 @@ are drawn at random. A bound must hold everywhere, and must be nearly reached so
 that stays far below its bound would not notice a smaller one.
 """
 
-import zlib
 from fractions import Fraction
-from pathlib import Path
 
 import mpmath
+import numba
 import numpy as np
 import pytest
 
-from armlock.compiled import njit
 from armlock.engine import inclusion
 from armlock.engine.functions import Function, Space, compiled
 from armlock.engine.polynomials import Polynomial, exact, of_roots, rounded
@@ -23,11 +21,6 @@ from tests import draws
 
 mp = mpmath.mp.clone()
 mp.dps = 50
-# What is compiled here is kept as long as what it calls has this source: `armlock.compiled`
-# takes numbers of a module for a part of its source.
-CALLED = zlib.crc32(
-    b"".join(path.read_bytes() for path in sorted(Path(inclusion.__file__).parent.glob("*.py")))
-)
 
 
 def number(value):
@@ -108,27 +101,27 @@ class Exact:
         )
 
 
-@njit()
+@numba.njit
 def workspace(space, functions):
     return inclusion.workspace(space, functions)
 
 
-@njit()
+@numba.njit
 def members(kind, functions):
     return inclusion.members(kind, functions)
 
 
-@njit()
+@numba.njit
 def enclose(functions, middle, half, work):
     inclusion.enclose(functions, middle, half, work)
 
 
-@njit()
+@numba.njit
 def phase_of(theta, tail, omega):
     return inclusion._phase(theta, tail, omega)
 
 
-@njit()
+@numba.njit
 def holds(weights, along, gamma, work, room):
     """Whether members with these weights exclude zero."""
     for n in range(weights.shape[0]):
