@@ -62,20 +62,16 @@ def test_where_nothing_can_be_written_each_process_compiles(tmp_path):
     assert err.count("Warning") == err.count(NOT_KEPT) == 1
 
 
-def test_a_full_disk_ends_no_call(tmp_path):
-    assert printed(tmp_path) == ("6 4 True\n", "")
+def test_compiling_says_once_what_takes_long_and_a_full_disk_ends_no_call(tmp_path):
+    line = "armlock: compiling, once for this installation ...\n"
+    assert printed(tmp_path, TQDM_DISABLE="") == ("6 4 True\n", line)
+    assert printed(tmp_path, TQDM_DISABLE="") == ("6 4 True\n", "")
     # The index fits onto the disk, and what has been compiled does not: what was compiled with
     # the other factor stays there.
     out, err = printed(tmp_path, factor=5, full=True)
     assert out == "15 4 False\n"
     assert err.count("Warning") == err.count(NOT_KEPT) == 1
     assert printed(tmp_path, factor=5) == ("15 4 True\n", "")
-
-
-def test_compiling_says_once_what_takes_long(tmp_path):
-    line = "armlock: compiling, once for this installation ...\n"
-    assert printed(tmp_path, TQDM_DISABLE="") == ("6 4 True\n", line)
-    assert printed(tmp_path, TQDM_DISABLE="") == ("6 4 True\n", "")
 
 
 def test_walks_count_the_same_uncompiled(monkeypatch):
