@@ -374,14 +374,14 @@ def axis_crossings(
         raise CountError(f"no crossings{place(point)}: L is real near s = 0", point[None])
     if begin >= omega_max:
         return AxisCrossings(np.empty(0), np.empty(0))
-    turns, about = omega_max * n.space.longest / (2.0 * np.pi), 0.0
-    if turns * _SAMPLES_A_TURN > _MOST_CROSSINGS:
+    # The estimate counts no more of them in a turn than it tells apart.
+    if omega_max * n.space.longest / (2.0 * np.pi) * _SAMPLES_A_TURN > _MOST_CROSSINGS:
         about = _crossings_expected(n, m, np.geomspace(begin, omega_max, 200), least)
-    if about > _MOST_CROSSINGS:
-        raise CountError(
-            f"no crossings{place(point)}: there are about {about:.0e} up to {omega_max:.3g} "
-            "rad/s, give a lower omega_max", point[None],
-        )  # fmt: skip
+        if about > _MOST_CROSSINGS:
+            raise CountError(
+                f"no crossings{place(point)}: there are about {about:.0e} up to "
+                f"{omega_max:.3g} rad/s, give a lower omega_max", point[None],
+            )  # fmt: skip
     found = crossings(
         (n, n * 0, m), np.zeros(1), np.array([-_LARGE]), np.array([-least]),
         np.array([omega_max]), begin=begin,
