@@ -63,7 +63,7 @@ def rows_of(rng):
 def crossings_of(functions, y, lower, upper, begin, end):
     """Find the crossings of rows, and the intervals that are not decided."""
     rows = inclusion.Rows(y, lower, upper)
-    table, _ = inclusion.cross(compiled(functions), rows, begin, end, False, 1e-9, 5_000)
+    table, *_ = inclusion.cross(compiled(functions), rows, begin, end, False, 1e-9, 5_000)
     return table[table[:, 5] != 0.0], table[table[:, 5] == 0.0]
 
 

@@ -312,10 +312,17 @@ def test_a_curve_of_terms_that_cancel_has_all_digits():
     assert np.abs(np.diff(curve.response[:1000])).max() < 0.1
 
 
-def test_too_many_crossings_are_refused_at_once():
-    loop = System.of(2e5) / s * delay(15e-6) * (1 - delay(16.7))
+@pytest.mark.parametrize(
+    ("loop", "omega_max", "lower"),
+    [
+        (System.of(2e5) / s * delay(15e-6) * (1 - delay(16.7)), None, 2.0),
+        # None crosses up to 1e5 rad/s, where 15 us turn by a quarter.
+        (Loop(((-100.0,), (0.0,), 1e4), COMMON, 16.7, 16.65, delay=15e-6), 1e6, 1e4),
+    ],
+)
+def test_too_many_crossings_are_refused_at_once(loop, omega_max, lower):
     begin = time.process_time()
-    with pytest.raises(CountError, match=r"about .* up to .* rad/s, give a lower omega_max"):
-        axis_crossings(loop)
+    with pytest.raises(CountError, match=r"too many steps up to .*, give a lower omega_max"):
+        axis_crossings(loop, omega_max=omega_max)
     assert time.process_time() - begin < 1.0
-    assert axis_crossings(loop, omega_max=2.0).omega.size > 3
+    axis_crossings(loop, omega_max=lower)

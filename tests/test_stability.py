@@ -339,14 +339,13 @@ def test_more_points_than_memory_holds_are_refused():
         unstable_roots(CommonArm(), np.zeros((300_000, 1)), np.zeros(400_000))
 
 
-def test_where_rounding_hides_all_crossings_few_intervals_are_kept(monkeypatch):
+def test_where_rounding_hides_all_crossings_few_intervals_are_kept():
     # N is c2 times M, but for a part in 1e16: each step leaves an interval undecided.
-    monkeypatch.setattr(crossings, "STEPS_OF_ROWS", 20_000)
     loop = Loop(Controller([], [-1.0], 1e16), DIFFERENCE, 20.0, 20.0)
     constant, first, second = loop.affine.terms
     functions = constant, second * -1, first * -1
     y, one = np.array([0.5, 0.6]), np.ones(2)
-    found = crossings.crossings(functions, y, -one, one, 1e4 * one)
+    found = crossings.crossings(functions, y, -one, one, 1e4 * one, most=20_000)
     assert found.unfinished.all()
     assert 0 < (found.jump == 0).sum() <= 4096 * y.size
 

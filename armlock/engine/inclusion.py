@@ -1430,7 +1430,7 @@ def cross(
     is_map: bool,
     fine: float,
     most: int,
-) -> tuple[FloatArray, BoolArray]:
+) -> tuple[FloatArray, BoolArray, int]:
     """Find the zeros on the axis of rows f_0 - y f_1 - x f_2.
 
     With N = f_0 - y f_1 and M = f_2 they are where h = Im(N conj M) is zero, at x = Re(N / M)
@@ -1441,7 +1441,7 @@ def cross(
     Returns a table of crossings: row; x, exact to `fine` where rounding allows, and how far
     from it at most; frequency, and how far from it; by how many the zeros on the right increase
     with x, or 0 for an interval that is undecided, which may hold any number. And the rows for
-    which so many steps, in all, did not suffice.
+    which `most` steps, in all, did not suffice, and how many steps there were.
     """
     number, space = rows.y.size, functions.space
     three = functions.steady.shape[0]
@@ -1490,4 +1490,4 @@ def cross(
         found, n = _append(found, n, entries[:new]), n + new
         for i in range(new):
             undecided += entries[i, 5] == 0.0
-    return found[:n].copy(), unfinished
+    return found[:n].copy(), unfinished, steps

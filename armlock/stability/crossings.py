@@ -14,6 +14,10 @@ from armlock.engine.decide import blocks, in_threads
 from armlock.engine.functions import Function, compiled
 from armlock.engine.tolerances import STEPS_OF_ROWS
 
+# The steps of a row are estimated from so many pieces of the axis, each of so many turns of the
+# longest delay.
+_PIECES, _TURNS = 300, 4
+
 
 class Crossings(NamedTuple):
     """Zeros on the axis, and intervals of the axis in which rounding hides them.
@@ -51,6 +55,7 @@ def crossings(
     *,
     begin: float = 0.0,
     fine: float = 0.0,
+    most: int = STEPS_OF_ROWS,
 ) -> Crossings:
     """Find where rows f_0 - y f_1 - x f_2 have zeros on the imaginary axis.
 
@@ -66,6 +71,8 @@ def crossings(
         From which on; zero for the axis with s = 0, where one root crosses alone.
     fine : float, optional
         How exact x has to be.
+    most : int, optional
+        Steps for the rows of one block.
     """
     three, step = compiled(functions), functions[0].space.step
     # Rows of one block share intervals, and those that end at different x share few.
@@ -76,9 +83,7 @@ def crossings(
         last = float(end[k].max())
         is_map = bool(step) and last >= np.pi / step
         rows = inclusion.Rows(y[k], lower[k], upper[k])
-        table, unfinished = inclusion.cross(
-            three, rows, begin, last, is_map, fine, STEPS_OF_ROWS
-        )
+        table, unfinished, _ = inclusion.cross(three, rows, begin, last, is_map, fine, most)
         table[:, 0] += k.start
         return table, unfinished
 
@@ -89,3 +94,22 @@ def crossings(
     return Crossings(
         row.astype(np.int64), x, spread, omega, width, jump.astype(np.int64), unfinished
     )
+
+
+def steps_expected(
+    functions: Sequence[Function], lower: float, upper: float, begin: float, end: float
+) -> float:
+    """Estimate the steps of a row with y = 0, or return 0 where the axis has few turns.
+
+    The steps on short pieces of the axis stand for those on all of it.
+    """
+    pieces = (end - begin) * functions[0].space.longest / (2.0 * np.pi * _TURNS)
+    if pieces < 100.0 * _PIECES:
+        return 0.0
+    three, row = compiled(functions), inclusion.Rows(*np.array([[0.0], [lower], [upper]]))
+    total, piece = 0, (end - begin) / pieces
+    for low in begin + (end - begin) * (np.arange(_PIECES) + 0.5) / _PIECES:
+        steps = inclusion.cross(three, row, low, low + piece, False, 0.0, STEPS_OF_ROWS)[2]
+        # A piece of one step lies in a longer interval of one step.
+        total += steps if steps > 1 else 0
+    return pieces * total / _PIECES

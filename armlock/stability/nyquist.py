@@ -24,9 +24,9 @@ from armlock.engine.functions import (
     stacked,
 )
 from armlock.engine.polynomials import rounded
-from armlock.engine.tolerances import EPSILON
+from armlock.engine.tolerances import EPSILON, STEPS_OF_A_COUNT
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided, place
-from armlock.stability.crossings import crossings
+from armlock.stability.crossings import crossings, steps_expected
 from armlock.systems import System
 from armlock.tables import Shown, Table, number, spread
 from armlock.tables import at as where
@@ -37,10 +37,6 @@ if TYPE_CHECKING:
 # Where |L| is below it no crossing of the negative real axis is of interest, and above the
 # other one a pole is on the axis.
 _SMALL, _LARGE = 1e-3, 1e12
-# More crossings than this are not looked for: each takes a step or more.
-_MOST_CROSSINGS = 1e7
-# How many of them are told apart in one turn of the longest delay, to estimate their number.
-_SAMPLES_A_TURN = 32
 # To this share L has to agree at both ends of the interval that holds a crossing.
 _AGREED = 1e-3
 # Crossings that a table shows.
@@ -374,21 +370,19 @@ def axis_crossings(
         raise CountError(f"no crossings{place(point)}: L is real near s = 0", point[None])
     if begin >= omega_max:
         return AxisCrossings(np.empty(0), np.empty(0))
-    # The estimate counts no more of them in a turn than it tells apart.
-    if omega_max * n.space.longest / (2.0 * np.pi) * _SAMPLES_A_TURN > _MOST_CROSSINGS:
-        about = _crossings_expected(n, m, np.geomspace(begin, omega_max, 200), least)
-        if about > _MOST_CROSSINGS:
-            raise CountError(
-                f"no crossings{place(point)}: there are about {about:.0e} up to "
-                f"{omega_max:.3g} rad/s, give a lower omega_max", point[None],
-            )  # fmt: skip
+    too_many = CountError(
+        f"no crossings{place(point)}: they take too many steps up to {omega_max:.3g} rad/s, "
+        "give a lower omega_max", point[None],
+    )  # fmt: skip
+    functions = n, n * 0, m
+    if steps_expected(functions, -_LARGE, -least, begin, omega_max) > STEPS_OF_A_COUNT:
+        raise too_many
     found = crossings(
-        (n, n * 0, m), np.zeros(1), np.array([-_LARGE]), np.array([-least]),
-        np.array([omega_max]), begin=begin,
+        functions, np.zeros(1), np.array([-_LARGE]), np.array([-least]),
+        np.array([omega_max]), begin=begin, most=STEPS_OF_A_COUNT,
     )  # fmt: skip
     if found.unfinished.any():
-        why = f"they take too many steps up to {omega_max:.3g} rad/s, give a lower omega_max"
-        raise CountError(f"no crossings{place(point)}: {why}", point[None])
+        raise too_many
     told = found.jump != 0
     hidden = ~told & (found.x - found.spread < -_SMALL) & (found.x + found.spread > -_LARGE)
     value = _response(n, m, found.omega).real
@@ -400,14 +394,6 @@ def axis_crossings(
     kept = agreed & (value < -least) & (value > -_LARGE)
     order = np.argsort(found.omega[kept])
     return AxisCrossings(found.omega[kept][order], value[kept][order])
-
-
-def _crossings_expected(n: Function, m: Function, omega: FloatArray, least: float) -> float:
-    """About how many crossings there are, from one turn of the longest delay at frequencies."""
-    turn = 2.0 * np.pi / n.space.longest
-    value = _response(n, m, np.add.outer(omega, np.linspace(0.0, turn, _SAMPLES_A_TURN + 1)))
-    crossed = np.diff(value.imag < 0.0, axis=1) & (value.real[:, 1:] < -least)
-    return float(np.trapezoid(crossed.sum(axis=1), omega) / turn)
 
 
 def _agree(n: Function, m: Function, omega: FloatArray, value: FloatArray) -> BoolArray:
