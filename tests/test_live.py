@@ -863,9 +863,9 @@ def test_a_bad_link_is_said_and_left_as_it_is(opened):
         page.wait_for_timeout(500)
         assert page.evaluate("location.hash") == fragment
         assert page.locator(".live-numbers").inner_text() == ""
-    start(page, "Single arm")
-    assert "stable" in said(page)
-    assert page.locator("[role=alert]").text_content() == ""
+        start(page, "Single arm")
+        assert "stable" in said(page)
+        assert page.locator("[role=alert]").text_content() == ""
 
 
 def test_the_pictures_show_the_margins_of_the_table(opened):

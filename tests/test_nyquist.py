@@ -317,12 +317,12 @@ def test_a_curve_of_terms_that_cancel_has_all_digits():
     [
         (System.of(2e5) / s * delay(15e-6) * (1 - delay(16.7)), None, 2.0),
         # None crosses up to 1e5 rad/s, where 15 us turn by a quarter.
-        (Loop(((-100.0,), (0.0,), 1e4), COMMON, 16.7, 16.65, delay=15e-6), 1e6, 1e4),
+        (Loop(((-100.0,), (0.0,), 1e4), COMMON, 16.7, 16.65, delay=15e-6), 1e6, 1.1e5),
     ],
 )
 def test_too_many_crossings_are_refused_at_once(loop, omega_max, lower):
     begin = time.process_time()
-    with pytest.raises(CountError, match=r"too many steps up to .*, give a lower omega_max"):
+    with pytest.raises(CountError, match=r"steps up to .* rad/s, give a lower omega_max"):
         axis_crossings(loop, omega_max=omega_max)
     assert time.process_time() - begin < 1.0
-    axis_crossings(loop, omega_max=lower)
+    assert axis_crossings(loop, omega_max=lower).omega.size > 3

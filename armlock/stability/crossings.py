@@ -96,20 +96,28 @@ def crossings(
     )
 
 
-def steps_expected(
-    functions: Sequence[Function], lower: float, upper: float, begin: float, end: float
-) -> float:
-    """Estimate the steps of a row with y = 0, or return 0 where the axis has few turns.
+def takes_more(
+    functions: Sequence[Function],
+    lower: float,
+    upper: float,
+    begin: float,
+    end: float,
+    most: int,
+) -> bool:
+    """Estimate whether a row with y = 0 takes more than so many steps.
 
-    The steps on short pieces of the axis stand for those on all of it.
+    The steps on short pieces of the axis stand for those on all of it. Where the axis has few
+    turns of the longest delay nothing is estimated.
     """
     pieces = (end - begin) * functions[0].space.longest / (2.0 * np.pi * _TURNS)
     if pieces < 100.0 * _PIECES:
-        return 0.0
+        return False
     three, row = compiled(functions), inclusion.Rows(*np.array([[0.0], [lower], [upper]]))
-    total, piece = 0, (end - begin) / pieces
+    piece, allowed, taken = (end - begin) / pieces, int(most * _PIECES / pieces), 0
     for low in begin + (end - begin) * (np.arange(_PIECES) + 0.5) / _PIECES:
-        steps = inclusion.cross(three, row, low, low + piece, False, 0.0, STEPS_OF_ROWS)[2]
+        steps = inclusion.cross(three, row, low, low + piece, False, 0.0, 1 + allowed)[2]
         # A piece of one step lies in a longer interval of one step.
-        total += steps if steps > 1 else 0
-    return pieces * total / _PIECES
+        taken += steps if steps > 1 else 0
+        if taken > allowed:
+            return True
+    return False

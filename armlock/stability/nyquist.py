@@ -26,7 +26,7 @@ from armlock.engine.functions import (
 from armlock.engine.polynomials import rounded
 from armlock.engine.tolerances import EPSILON, STEPS_OF_A_COUNT
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided, place
-from armlock.stability.crossings import crossings, steps_expected
+from armlock.stability.crossings import crossings, takes_more
 from armlock.systems import System
 from armlock.tables import Shown, Table, number, spread
 from armlock.tables import at as where
@@ -375,7 +375,7 @@ def axis_crossings(
         "give a lower omega_max", point[None],
     )  # fmt: skip
     functions = n, n * 0, m
-    if steps_expected(functions, -_LARGE, -least, begin, omega_max) > STEPS_OF_A_COUNT:
+    if takes_more(functions, -_LARGE, -least, begin, omega_max, STEPS_OF_A_COUNT):
         raise too_many
     found = crossings(
         functions, np.zeros(1), np.array([-_LARGE]), np.array([-least]),
